@@ -1,9 +1,9 @@
 /* Bresenham scanline: two Bresenham lines, walked from the top down together, and the pixels between them.
  *
  * In: vertices, truncated to pixels.  They are sorted by y, then x, and turned clockwise; a triangle with a corner at mid
- * height is split there, by linear interpolation, into one with a flat bottom and one with a flat top.  Out: each row from
- * the left line's outermost pixel to the right one's, both included.  "top-left" takes the first pixel of either line's run
- * in a row and leaves the right one and the last row out.  "wireframe" draws the lines and the flat sides alone.
+ * height is split there, by linear interpolation, into a flat-bottom and a flat-top triangle.  Out: each row from the left
+ * line's outermost pixel to the right line's, both included.  "top-left" fills from the first pixel of either line's run in
+ * a row, without the right end and without the last row.  "wireframe" draws only the lines and the flat sides.
  *
  * Based on: xterminal86, Software 3D renderer tutorial, part 2: Triangle, 2023;
  * J. E. Bresenham, Algorithm for computer control of a digital plotter, 1965. */
@@ -96,7 +96,7 @@ static void fill_basic(const classic_target *t, classic_point a, classic_point b
                      right_last);
         if (form == BRESENHAM_SCANLINE_TOP_LEFT)
             fill_span(t, y, left_first, right_first - 1);
-        else /* which end of a run lies outside depends on the side and on the way that the line goes */
+        else /* which end of a run lies outside depends on the side and on the direction of the line */
             fill_span(t, y, left_takes_last ? left_last : left_first, right_takes_first ? right_first : right_last);
     }
 }

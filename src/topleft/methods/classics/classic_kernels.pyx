@@ -1,7 +1,7 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, initializedcheck=False, cdivision=True, embedsignature=False
 # cython: freethreading_compatible=True
 # cython: auto_pickle=False, emit_code_comments=False
-"""The classics as one compiled module: arrays in, the methods of classics.h over their triangles."""
+"""The classics as a compiled module: calls the methods of classics.h for the triangles of arrays."""
 
 import numpy as np
 
@@ -50,7 +50,7 @@ FORMS: dict[str, tuple[str, ...]] = {
 cdef void *lend(object array, Py_buffer *view, Py_ssize_t item_size, int n_columns, int flags) except? NULL:
     """Return the memory of a contiguous array of rows of at least `n_columns` items (0: one dimension).
 
-    Typed memoryviews would do the same, and be most of the module.
+    Typed memoryviews would do this, too, but be most of the module.
     """
     PyObject_GetBuffer(array, view, PyBUF_C_CONTIGUOUS | flags)
     if view.itemsize != item_size or view.ndim != (2 if n_columns else 1) or (n_columns and view.shape[1] < n_columns):

@@ -1,4 +1,4 @@
-/* The classics as one table: each method is a file beside this one, with a function that draws one triangle.  Python
+/* The table of the classics: each method is a file of this folder, with a function that draws a triangle.  Python
  * calls them by classic_kernels.pyx, a page without Python by the module of WebAssembly. */
 #ifndef CLASSICS_H
 #define CLASSICS_H

@@ -1,12 +1,12 @@
 /* Edge increment: integer edge functions, set up once a triangle, then stepped by additions along rows and columns.
  *
  * In: vertices, snapped to sub-pixels ("integer": truncated to pixels, which are sampled at their corner).  Out: the pixels
- * with all three edge functions >= 0 after one unit was taken off the edges that own nothing.  "bottom-right" takes it off
- * the top and left edges: as watertight, but other pixels.
+ * with all three edge functions >= 0 after a bias of -1 on the edges that are neither top nor left.  "bottom-right" has the
+ * bias on the top and left edges: as watertight, but other pixels.
  *
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988;
  * F. Giesen, Optimizing the basic rasterizer, 2013 (the steps and the bias);
- * K. Dyrkorn, A fast and precise triangle rasterizer, 2022 (the variant that leaves top and left edges out). */
+ * K. Dyrkorn, A fast and precise triangle rasterizer, 2022 (the variant without top and left edges). */
 #ifndef CLASSIC_EDGE_INCREMENT_H
 #define CLASSIC_EDGE_INCREMENT_H
 

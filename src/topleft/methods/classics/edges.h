@@ -10,7 +10,7 @@ typedef struct {
     int64_t value[3];
     int64_t step_x[3];           /* one pixel to the right */
     int64_t step_y[3];           /* one pixel down */
-    int64_t x[3], y[3], bias[3]; /* the corners, clockwise as seen; -1 on the edges that own nothing */
+    int64_t x[3], y[3], bias[3]; /* the corners, clockwise as seen; -1 on excluded edges */
 } classic_edges;
 
 /* Of an edge of a triangle with positive signed area. */
@@ -54,8 +54,8 @@ static inline void note_edges(const classic_edges *e, const classic_target *t)
                  e->step_x[0], e->step_x[1], e->step_x[2], e->step_y[0], e->step_y[1], e->step_y[2]);
 }
 
-/* Sets up from vertices snapped to `subpixel_bits`, as the library snaps them; one bit more where there is none, so that
- * a pixel centre is an integer. */
+/* Sets up from vertices snapped to `subpixel_bits`, as the library snaps them; to 1 bit where that is 0, so that a pixel
+ * centre is an integer. */
 static inline int snap_edges(classic_edges *e, const classic_target *t, const double *a, const double *b,
                              const double *c, int subpixel_bits, int bottom_right)
 {

@@ -1,10 +1,10 @@
 /* Float barycentric: every pixel centre of the bounding box, three weights in floating point, all of them >= 0.
  *
- * In: vertices as they are, nothing is snapped.  Out: the pixels without a negative weight at the centre; edges belong to both
- * their triangles, where rounding lets them.  All in float32; "float64" is the same in float64.
+ * In: vertices, not snapped.  Out: the pixels without a negative weight at the centre; pixels on an edge are in both its
+ * triangles, up to rounding.  Computes in float32, "float64" in float64.
  *
  * Based on: scratchapixel, Rasterization: a Practical Implementation, 2015;
- * Y. Feng, face3d, 2018, and J. Guo, 3DDFA_V2 with Sim3DR, 2020 (the renderers that Python programs use most do this). */
+ * Y. Feng, face3d, 2018, and J. Guo, 3DDFA_V2 with Sim3DR, 2020 (the renderers that Python programs use most). */
 #ifndef CLASSIC_FLOAT_BARYCENTRIC_H
 #define CLASSIC_FLOAT_BARYCENTRIC_H
 

@@ -1,9 +1,9 @@
 /* Lerp scanline: sorted by height, two float interpolations a row, and the pixels between them.
  *
- * In: vertices, truncated to pixels.  The long edge runs from the top vertex to the bottom one, the short edges from the top
- * to the middle and from the middle to the bottom; either is asked for its x by a float32 fraction of the height, truncated.
- * Out: spans that include both ends, without the last row.  "plus-one" is the form that the same lesson starts from: one
- * more in the heights of the short edges, against division by zero, and two loops that both draw the middle row.
+ * In: vertices, truncated to pixels.  The long edge runs from the top to the bottom vertex, the short edges from the top to
+ * the middle and from the middle to the bottom; x is interpolated by a float32 fraction of the height, and truncated.
+ * Out: spans that include both ends, without the last row.  "plus-one" is the first form of the lesson: the heights of the
+ * short edges plus 1, against division by zero, and two loops that both draw the middle row.
  *
  * Based on: D. Sokolov, tinyrenderer, lesson 2: Triangle rasterization and back face culling, 2015. */
 #ifndef CLASSIC_LERP_SCANLINE_H

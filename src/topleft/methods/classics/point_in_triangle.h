@@ -1,11 +1,11 @@
 /* Point in triangle: every pixel of the bounding box, three cross products each.
  *
- * In: vertices, truncated to pixels.  Out: the pixels with three cross products of one sign, zero included, so either
- * winding will do and edges belong to both their triangles.  "top-left" turns the triangle one way round and takes one
- * unit off the edges that are neither top nor left.
+ * In: vertices, truncated to pixels.  Out: the pixels with three cross products of equal sign, zero included, so both
+ * windings are drawn and pixels on an edge are in both its triangles.  "top-left" makes the winding clockwise and has a
+ * bias of -1 on the edges that are neither top nor left.
  *
  * Based on: xterminal86, Software 3D renderer tutorial, part 3: Scanline is a lie, 2023 (this form);
- * J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (where it comes from). */
+ * J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (the origin). */
 #ifndef CLASSIC_POINT_IN_TRIANGLE_H
 #define CLASSIC_POINT_IN_TRIANGLE_H
 

@@ -1,12 +1,12 @@
-/* Row crossing: each row asks the three edges where it crosses them, and fills from the least answer to the greatest.
+/* Row crossing: each row computes where it crosses the three edges, and fills from the least to the greatest crossing.
  *
- * In: vertices, truncated to pixels.  An edge answers in float32, rounded to the nearest pixel, for the rows between its
- * ends, both included; a horizontal one does not answer, so a horizontal line vanishes and a vertical one stays.  Out: spans
- * that include both ends.  "zero-area-test" drops triangles without area first; "cull-back" and "cull-front" drop those, too,
- * and one winding (the front is counter-clockwise as seen).
+ * In: vertices, truncated to pixels.  Crossings are float32, rounded to the nearest pixel, for the rows between the ends of
+ * an edge, both included; a horizontal edge has none, so a horizontal line vanishes and a vertical line stays.  Out: spans
+ * that include both ends.  "zero-area-test" drops triangles without area first; "cull-back" and "cull-front" drop triangles
+ * without area and one winding (the front is counter-clockwise as seen).
  *
  * Based on: C. Wylie, G. Romney, D. Evans, A. Erdahl, Half-tone perspective drawings by computer, 1967;
- * D. R. Finley, Efficient Polygon Fill Algorithm, 2007 (each row asks each edge). */
+ * D. R. Finley, Efficient Polygon Fill Algorithm, 2007 (each row crosses each edge). */
 #ifndef CLASSIC_ROW_CROSSING_H
 #define CLASSIC_ROW_CROSSING_H
 

@@ -89,7 +89,7 @@ static inline int64_t *note_step(classic_trace *trace, const int64_t *window, in
     return numbers;
 }
 
-/* `put` writes the number i_ of those given into two words. */
+/* `put` writes each of the numbers into two words. */
 #define NOTE_STEP(type, put, t, kind, x, y, last, is_drawn, ...)                               \
     do {                                                                                       \
         const type given[] = {__VA_ARGS__};                                                    \

@@ -4,9 +4,9 @@
 
 #include <stdint.h>
 
-/* A kind of step.  "triangle": it is set up, (x, y) the first of its pixels.  "test": a pixel is asked.  "row": a row begins.
- * "line": a line of that side passes a pixel.  "span": the pixels x to last are drawn.  Then the names of the numbers that
- * decide it, how many each has, and how many that makes. */
+/* A kind of step.  "triangle": a triangle is set up, (x, y) is its first pixel.  "test": a pixel is tested.  "row": a row
+ * begins.  "line": the line of `side` passes a pixel.  "span": the pixels x to last are drawn.  `numbers`: the names of the
+ * numbers that decide the step, with their counts; `n`: how many in all. */
 typedef struct {
     const char *name, *side;
     int is_real;
@@ -14,11 +14,11 @@ typedef struct {
     int n;
 } classic_kind;
 
-extern const classic_kind CLASSIC_KINDS[]; /* up to one without a name */
+extern const classic_kind CLASSIC_KINDS[]; /* the last has no name */
 
-/* Draws counts over a cleared window (x, y, width, height), and writes the steps, as steps.h says; a number of a method
- * behind the last one of classics.h: the walkers of walks.h.  Returns how many steps there are: there is room for all of
- * them where the words hold 24 of each, and 24 more of each triangle. */
+/* Draws counts over a cleared window (x, y, width, height), and writes the steps in the format of steps.h; methods beyond
+ * the last of classics.h are the walkers of walks.h.  Returns how many steps there are: `words` holds all of them where it
+ * has 24 words for each step, and 24 more for each triangle. */
 int64_t trace_steps(int method, int form, int subpixel_bits, const double *vertices, int64_t stride,
                     const int32_t *triangles, int64_t n, const int64_t *window, int32_t *counts, int64_t *words,
                     int64_t n_words);

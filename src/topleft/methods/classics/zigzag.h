@@ -1,8 +1,8 @@
-/* Zigzag: integer edge functions again, but the walk turns round at the triangle's sides instead of the box's.
+/* Zigzag: integer edge functions, in a walk that turns round at the triangle's sides instead of the box's.
  *
- * In: vertices, snapped to sub-pixels.  Out: the pixels that edge_increment finds, in another order: one row to the right,
- * the next to the left.  A row is left when an edge function is negative, and will stay so, both there and in the row below;
- * then whatever the next row covers lies the other way.
+ * In: vertices, snapped to sub-pixels.  Out: the pixels of edge_increment, in another order: a row to the right, the next
+ * row to the left.  A row ends where an edge function is negative, and will stay so, both there and in the row below; then
+ * the samples that the next row covers lie in the other direction.
  *
  * Based on: J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988 (smarter traversal, figure 5);
  * T. Akenine-Moeller, J. Stroem, Graphics for the Masses, 2003 (the zigzag by name). */
@@ -11,7 +11,7 @@
 
 #include "edges.h"
 
-/* Whether nothing is covered from here on, neither in this row nor in the next (step_y NULL: in this one). */
+/* Whether no later sample is covered, neither in this row nor in the next (step_y NULL: in this row). */
 static inline int is_behind(const int64_t *w, const int64_t *step_x, const int64_t *step_y, int64_t way)
 {
     int here = 0, below = step_y == NULL;
