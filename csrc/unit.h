@@ -8,12 +8,9 @@
 #define TL_JOINED(a, b, c) TL_JOIN(a, b, c)
 #define TL_KERNELS_OF TL_JOINED(TL_UNIT_, TL_UNIT, )
 
-/* Stubs for the sinks of hooks.h that no kernel of this unit draws with. */
-#if defined(TL_HOOKS_H) && !defined(TL_MIX_SHAPES_C)
+/* A stub where no kernel of this unit draws with the sink of hooks.h. */
+#if defined(TL_HOOKS_H) && !defined(TL_FILL_SHAPES_C)
 static void mix_run(struct blend_state *b, int64_t at, int64_t n) { (void)b, (void)at, (void)n, __builtin_trap(); }
-#endif
-#if defined(TL_HOOKS_H) && !defined(TL_ROW_SPANS_C)
-static void note_span(struct span_table *t, int64_t at, int64_t n) { (void)t, (void)at, (void)n, __builtin_trap(); }
 #endif
 
 void TL_JOINED(tl_set_, TL_UNIT, TL_JOINED(_, TL_ISA, ))(tl_kernels *kernels);

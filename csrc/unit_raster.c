@@ -11,7 +11,7 @@
 #include "exact/take_points.c"
 #include "raster/bin.c"
 #include "raster/sides.c"
-#include "large_shapes/large_shapes.c"
+#include "raster/raster.c"
 #include "area/area.c"
 #include "points/cloud.c"
 #include "lines/edges.c"

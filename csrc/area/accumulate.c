@@ -16,7 +16,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "large_shapes/row_runs.c"
+#include "sink/pixel_runs.c"
 #include "area/ramp.c"
 
 #define TL_SUM_MARGIN (1 << 20) /* rounding may give a few units less than 0 */

@@ -25,7 +25,6 @@
 #include "raster/triangles_fixed.c"
 #include "raster/triangles_float.c"
 #include "blend/blend_area.c"
-#include "blend/blend_shapes.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_u8.c"
@@ -247,24 +246,27 @@ static tl_mix mix_of(const tl_canvas *canvas)
     }
 }
 
-/* The window has fewer than 2^31 samples. */
-static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
+static void start_blend(blend_state *b, const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
 {
-    blend_pass p;
-    blend_state *b = &p.mix;
-    const int64_t n_channels = canvas->n_channels;
     b->snapped = snapped, b->window = window, b->canvas = canvas;
     b->packed = canvas->is_u8 ? canvas->packed ? canvas->packed : canvas->pixels : NULL;
     b->floats = canvas->is_u8 ? NULL : canvas->pixels;
-    b->stride = canvas->packed || canvas->is_large_shapes ? window->width : canvas->stride_px;
+    b->stride = canvas->packed ? window->width : canvas->stride_px;
     b->n_samples = b->stride * (window->height - 1) + window->width;
     b->n_channels = canvas->n_channels, b->is_flat = canvas->is_flat, b->mode = mix_of(canvas);
     b->target = (tl_target){.sink = TL_SINK_BLEND, .pixels = b, .stride_px = b->stride, .n_samples = b->n_samples};
     b->ground = canvas->ground && canvas->is_u8 ? packed_color(canvas->ground, canvas->n_channels) : 0;
     b->n_laid = canvas->ground ? 0 : window->height;
     b->shapes = NULL;
-    if (canvas->is_large_shapes)
-        return blend_large_shapes(b);
+}
+
+/* A window of fewer than 2^31 samples. */
+static int64_t blend_window(const tl_snapped *snapped, const tl_window *window, const tl_canvas *canvas)
+{
+    blend_pass p;
+    blend_state *b = &p.mix;
+    const int64_t n_channels = canvas->n_channels;
+    start_blend(b, snapped, window, canvas);
     if (snapped->mesh.exact || !canvas->is_area)
         lay_ground(b, window->height);
     for (int64_t row = 0; canvas->packed && !canvas->ground && row < window->height; row++)
@@ -287,7 +289,7 @@ static int64_t blend(const tl_snapped *snapped, const tl_window *window, const t
 {
     const int64_t pixel_bytes = canvas->n_channels * (canvas->is_u8 ? 1 : 4);
     const int64_t fitting = max64(1, (((int64_t)1 << 31) - 1) / canvas->stride_px);
-    const int64_t rows_at_once = canvas->is_large_shapes ? window->height : min64(fitting, canvas->band_rows);
+    const int64_t rows_at_once = min64(fitting, canvas->band_rows);
     for (int64_t row = 0; row < window->height; row += rows_at_once) {
         tl_window band = *window;
         tl_canvas part = *canvas;

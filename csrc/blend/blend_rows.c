@@ -18,7 +18,6 @@
 #include "blend/blend_strip.c"
 #include "blend/mix.c"
 #include "blend/mix.h"
-#include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
 /* Fewer rows or columns are not faster this way. */
@@ -126,7 +125,7 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
     for (int k = 0; k < n; k++) {
         const int64_t start = (row + k) * b->stride, end = start + plane->n_cols;
         if (!is_laid_beside) {
-            mix_run(b, first[k], at[1][k] - first[k]);
+            mix_pixels(b, first[k], at[1][k] - first[k]);
             continue;
         }
         /* from left to right: writing right of the triangle first takes 1.6 times as long */
@@ -137,10 +136,6 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
             put_solid(b->packed + at[1][k], end - at[1][k], b->ground);
     }
     b->n_laid = max64(b->n_laid, row + n);
-    for (int k = 0; b->shapes && k < n; k++) {
-        read_buffered(b, at[0][k], 4 * left->n_quads);
-        read_buffered(b, at[1][k], 4 * right->n_quads);
-    }
     for (int k = 0; k < 2; k++)
         for (int q = 0; q < sides[k]->n_quads; q++)
             mix_ramps(b, sides[k], q, k ? TL_WHOLE : 0, at[k], n, mode);

@@ -23,7 +23,6 @@
 #include "blend/mix.c"
 #include "blend/mix.h"
 #include "blend/mix_f32.c"
-#include "blend/mix_shapes.c"
 #include "blend/mix_u8.c"
 
 /* Blends the pixels [col, col + TL_LANES) of a row, from sample `at` on: those in m with an area > 0. */
@@ -33,11 +32,6 @@ TL_INLINE void mix_block(blend_state *b, int64_t at, vm m, vi sums, int is_u8, t
     const vm on = vm_and(m, vi_gt(area, vi_set1(0)));
     if (!vm_any(on))
         return;
-    if (b->shapes) {
-        const unsigned bits = vm_bits(on);
-        const int first = __builtin_ctz(bits);
-        read_buffered(b, at + first, 32 - __builtin_clz(bits) - first);
-    }
     if (!b->is_flat) {
         const unsigned bits = vm_bits(on);
         const int first = __builtin_ctz(bits), n = 32 - __builtin_clz(bits) - first;
@@ -78,7 +72,7 @@ TL_INLINE int32_t take_left_cells(int32_t *cells)
 TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, int32_t sum, int is_u8, tl_mix mode)
 {
     if (sum >= TL_WHOLE) {
-        mix_run(b, at + col, end - col);
+        mix_pixels(b, at + col, end - col);
         return;
     }
     for (; sum > 0 && col < end; col += TL_LANES)
@@ -130,7 +124,7 @@ TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mi
                 continue;
             }
             if (whole_from >= 0 && whole_from < col)
-                mix_run(b, at + whole_from, col - whole_from);
+                mix_pixels(b, at + whole_from, col - whole_from);
             whole_from = -1;
             const vi sums = vi_add(vi_prefix_sum(values), vi_set1(sum));
             vi_store(cells + col, bias);
@@ -139,7 +133,7 @@ TL_INLINE void blend_cells(blend_state *b, const cell_block *c, int is_u8, tl_mi
             mix_block(b, at + col, vm_and_not(vm_first(c->end - col), vm_first(c->first - col)), sums, is_u8, mode);
         }
         if (whole_from >= 0 && whole_from < c->end)
-            mix_run(b, at + whole_from, c->end - whole_from);
+            mix_pixels(b, at + whole_from, c->end - whole_from);
     }
 }
 

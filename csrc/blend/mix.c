@@ -231,6 +231,12 @@ static void mix_pixels(blend_state *b, int64_t at, int64_t n)
     mix_runs(b, &(int32_t){(int32_t)at}, &(int32_t){(int32_t)n}, 1, 1);
 }
 
+static __attribute__((noinline)) void walk_blended(const blend_state *b, const tl_vertex_set *set,
+                                                   const int32_t *corners, int64_t id, const tl_window *window)
+{
+    draw_triangle(set, corners, (int32_t)id, b->snapped, window, &b->target, TL_SINK_BLEND);
+}
+
 /* Blends triangle i, or its pieces, by itself. */
 static __attribute__((noinline)) void blend_single_fixed(blend_state *b, int64_t i)
 {
@@ -242,7 +248,7 @@ static __attribute__((noinline)) void blend_single_fixed(blend_state *b, int64_t
         const int32_t *corners = parts.corners + 3 * k;
         if (!b->is_flat)
             begin_gouraud(b, i, &parts.set, corners, parts.is_cut);
-        draw_triangle(&parts.set, corners, (int32_t)i, b->snapped, b->window, &b->target, TL_SINK_BLEND);
+        walk_blended(b, &parts.set, corners, i, b->window);
     }
 }
 

@@ -38,7 +38,7 @@ typedef struct blend_state {
     const tl_window *window;
     const tl_canvas *canvas;
     tl_target target;           /* for the walkers */
-    struct shape_state *shapes; /* of mix_shapes.c, or NULL */
+    struct shape_state *shapes; /* of fill_shapes.c, or NULL */
     int32_t *packed;            /* uint8: a pixel a lane */
     float *floats;              /* float32: a channel a lane */
     int64_t stride;             /* in pixels, of either */

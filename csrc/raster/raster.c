@@ -431,7 +431,7 @@ static int64_t draw_part(const tl_snapped *snapped, const tl_window *window, con
 }
 
 /* Clears, draws and finishes bands of less than 2^31 pixels. */
-static int64_t draw(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
+static int64_t draw_mesh(const tl_snapped *snapped, const tl_window *window, const tl_target *target, tl_slice *slice)
 {
     const int64_t pixel_bytes = target->sink == TL_SINK_MASK ? 1 : 4;
     const int64_t rows_at_once = max64(1, (((int64_t)1 << 31) - 1) / target->stride_px);

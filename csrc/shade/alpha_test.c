@@ -152,7 +152,7 @@ static void cut_triangle(cutout *c, shade_runs *s, const tl_window *window, int3
             const tl_target target = {
                 .sink = TL_SINK_PAINT, .pixels = c->tile.ids, .depth = c->tile.depth, .stride_px = TL_CUTOUT_TILE};
             tl_slice slice = {.ids = &id, .end = 1, .is_first = 1, .is_last = 1};
-            draw(&c->snapped, &part, &target, &slice);
+            draw_mesh(&c->snapped, &part, &target, &slice);
             for (int64_t row = 0; row < part.height; row++)
                 keep_opaque(c, s, &shading->materials[material], top + row, left, (int)part.width, row * TL_CUTOUT_TILE,
                             (top + row) * c->target->stride_px + left);

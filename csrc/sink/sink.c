@@ -21,7 +21,7 @@
 
 /* Copies of a function, one for each sink of whole samples, as a constant of its inner loops, and a call of the right
  * copy.  Such a function has the sink as its last parameter: TL_SINK_COPIES(f, (declared parameters), parameters ...),
- * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND, TL_SINK_SPANS and TL_SINK_CENSUS have separate code. */
+ * TL_SINK_CALL(f, sink, ...).  TL_SINK_SAMPLES, TL_SINK_BLEND and TL_SINK_CENSUS have separate code. */
 #define TL_SINK_COPY(f, name, sink, declared, ...) \
     static __attribute__((noinline)) void f##_##name declared { f(__VA_ARGS__, sink); }
 #define TL_SINK_COPIES(f, declared, ...)                               \
@@ -43,7 +43,6 @@
     case TL_SINK_PEEL: f##_peel(__VA_ARGS__); break;                          \
     case TL_SINK_SAMPLES:                                                     \
     case TL_SINK_BLEND:                                                       \
-    case TL_SINK_SPANS:                                                       \
     case TL_SINK_CENSUS: __builtin_trap();                                    \
     }
 
@@ -64,7 +63,6 @@
     case TL_SINK_PEEL: f##_nearest(__VA_ARGS__); break; \
     case TL_SINK_SAMPLES:                               \
     case TL_SINK_BLEND:                                 \
-    case TL_SINK_SPANS:                                 \
     case TL_SINK_CENSUS: __builtin_trap();              \
     }
 
@@ -165,10 +163,6 @@ TL_INLINE void put_plain(const tl_target *target, tl_sink sink, int64_t at, int6
     }
     if (sink == TL_SINK_BLEND) {
         mix_run(target->pixels, at, n);
-        return;
-    }
-    if (sink == TL_SINK_SPANS) {
-        note_span(target->pixels, at, n);
         return;
     }
     if (sink == TL_SINK_SAMPLES) {

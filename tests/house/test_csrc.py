@@ -15,8 +15,7 @@ FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
 #: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
 LADDER = (
-    ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("large_shapes",),
-    ("area", "points"),
+    ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("area", "points"),
     ("pixels",), ("blend", "grad", "lines", "polygons", "shade", "tiles"), ("grid",),
 )  # fmt: skip
 FLOORS = {folder: floor for floor, folders in enumerate(LADDER) for folder in folders}

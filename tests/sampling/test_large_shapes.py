@@ -1,4 +1,4 @@
-"""Pictures of a few large triangles, which are written row by row: the same as with so many that they are not."""
+"""Fills of a few large triangles, which are written row by row, equal fills with so many that they are not."""
 
 import numpy as np
 import pytest
@@ -41,10 +41,24 @@ def palette(n: int, channels: int, dtype: type) -> np.ndarray:
 
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"])
 @pytest.mark.parametrize("shape", SHAPES)
-def test_coverage_and_counts_of_few_triangles_equal_those_of_many(shape, sampling):
+def test_fill_of_few_triangles_equals_that_of_many(shape, sampling):
     few, many = meshes(SHAPES[shape])
-    assert (tl.coverage(*few, SIZE, sampling=sampling) == tl.coverage(*many, SIZE, sampling=sampling)).all()
-    assert (tl.overdraw(*few, SIZE, sampling=sampling) == tl.overdraw(*many, SIZE, sampling=sampling)).all()
+    colors, options = palette(1, 4, np.uint8), {"per": "triangle", "sampling": sampling}
+    assert (tl.fill(*few, colors[:1], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize("channels", [2, 4])
+@pytest.mark.parametrize("blend", ["over", "add", "multiply", "max", "min"])
+def test_blend_of_few_triangles_equals_that_of_many(blend, channels, dtype):
+    few, many = meshes(two_triangles())
+    colors = palette(2, channels, dtype)
+    background = np.full(channels, 0.25 if dtype is np.float32 else 9)
+    for last in (0, 100, 255):
+        colors[1, -1] = last if dtype is np.uint8 else last / 255
+        for alpha in ("straight", "premultiplied"):
+            options = {"per": "triangle", "background": background, "blend": blend, "alpha": alpha}
+            assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -80,17 +94,12 @@ def test_fill_by_area_over_a_background_equals_one_over_a_picture(shape, blend):
     {}, {"threads": 3}, {"method": "edge"}, {"method": "scanline"}, {"cull": "back"}, {"cull": "front"},
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"origin": (50, -70), "viewport": (900, 800)},
 ])  # fmt: skip
-def test_each_verb_with_options(options):
+def test_fill_with_options(options):
     few, many = meshes(two_triangles())
     colors = palette(2, 4, np.uint8)
-    assert (tl.coverage(*few, SIZE, **options) == tl.coverage(*many, SIZE, **options)).all()
-    assert (tl.overdraw(*few, SIZE, **options) == tl.overdraw(*many, SIZE, **options)).all()
     for sampling in ("center", "msaa4"):
         own = {"per": "triangle", "background": (1, 2, 3, 4), "sampling": sampling, **options}
         assert (tl.fill(*few, colors[:2], SIZE, **own) == tl.fill(*many, colors, SIZE, **own)).all()
-    for test in ("less", "greater", None):
-        ids, expected = (tl.rasterize(*mesh, SIZE, depth_test=test, **options).triangle for mesh in (few, many))
-        assert (ids == expected).all()
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
@@ -129,22 +138,17 @@ def test_pieces_of_a_triangle_that_planes_cut():
     triangles = np.array([[0, 1, 2]])
     many = np.concatenate([triangles, np.zeros((N_OTHERS, 3), int)])
     colors = palette(1, 4, np.uint8)
-    assert tl.coverage(vertices, triangles, SIZE).any()
     for sampling in ("center", "msaa4"):
-        options = {"sampling": sampling}
-        assert (tl.coverage(vertices, triangles, SIZE, **options) == tl.coverage(vertices, many, SIZE, **options)).all()
-        options["per"] = "triangle"
+        options = {"sampling": sampling, "per": "triangle"}
         picture = tl.fill(vertices, triangles, colors[:1], SIZE, **options)
+        assert picture.any()
         assert (picture == tl.fill(vertices, many, colors, SIZE, **options)).all()
 
 
 def test_arrays_of_the_caller():
     few, many = meshes(SHAPES["one"])
     colors = palette(1, 4, np.uint8)
-    mask, picture = np.ones((701, 1538), bool), np.full((701, 769, 8), 77, np.uint8)
-    tl.coverage(*few, SIZE, out=mask[:, ::2])
-    assert (mask[:, ::2] == tl.coverage(*many, SIZE)).all()
-    assert mask[:, 1::2].all()
+    picture = np.full((701, 769, 8), 77, np.uint8)
     tl.fill(*few, colors[:1], SIZE, per="triangle", background=5, out=picture[..., 4:])
     assert (picture[..., 4:] == tl.fill(*many, colors, SIZE, per="triangle", background=5)).all()
     assert (picture[..., :4] == 77).all()

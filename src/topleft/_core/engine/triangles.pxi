@@ -310,13 +310,11 @@ cdef class SnappedMesh:
 
     def blend(self, uint8_t[::1] pixels, int64_t width, int64_t first_row, int64_t n_rows, const uint8_t[::1] colors,
               int n_channels, bint is_u8, bint is_flat, int blend, bint is_premultiplied, int64_t band_rows,
-              const uint8_t[::1] ground or None, int32_t[::1] packed or None, int32_t[::1] cells or None,
-              bint is_large_shapes=False) -> int:
+              const uint8_t[::1] ground or None, int32_t[::1] packed or None, int32_t[::1] cells or None) -> int:
         """Blend the colours of triangles, in their order, into rows [first_row, first_row + n_rows) of a picture.
 
         `band_rows`: rows of a band, which is finished before the next. `ground`: the colour that the rows are cleared to,
         or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas.
-        `is_large_shapes`: flat colours over a ground are written row by row, and `packed` has room for BLENDED_ROWS rows.
         Returns as `draw` does.
         """
         cdef tl_canvas canvas
@@ -330,29 +328,21 @@ cdef class SnappedMesh:
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
         canvas.band_rows = band_rows
         canvas.ground = &ground[0] if ground is not None else NULL
-        canvas.is_large_shapes = is_large_shapes
-        canvas.packed = &packed[0 if is_large_shapes else first_row * width] if packed is not None else NULL
+        canvas.packed = &packed[first_row * width] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
             bad_row = K.blend(&self.snapped, &window, &canvas)
         raise_if_given_up()
         return bad_row
 
-    def is_large_shapes(self, int64_t width, int64_t height, int n_samples, int most) -> bool:
-        """Return whether to write a picture of the mesh row by row: large, snapped triangles.
-
-        `most`: SHAPES_OF_BITS, SHAPES_STORED or SHAPES_LABELLED, by the path that would draw it otherwise.
-        """
+    def is_large_shapes(self, int64_t width, int64_t height, int n_samples) -> bool:
+        """Return whether to fill flat colours row by row: few snapped triangles for the size of the picture."""
         cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
-        return self.snapped.mesh.exact == NULL and tl_is_large_shapes(n, n_samples, width, height, <tl_shape_limit>most)
+        return self.snapped.mesh.exact == NULL and tl_is_large_shapes(n, n_samples, width, height)
 
-    def blends_large_shapes(self, int64_t width, int64_t height) -> bool:
-        """Return whether to blend flat colours over a background row by row: large, snapped triangles."""
-        cdef int64_t n = self.snapped.n_triangles + (self.snapped.pieces.n_pieces if self.snapped.pieces != NULL else 0)
-        return self.snapped.mesh.exact == NULL and tl_shapes_are_blended(n, width, height)
-
-    def fill_large_shapes(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, Transfer transfer or None,
-                 const uint8_t[::1] ground, const int32_t[:, ::1] samples_fx) -> int:
+    def fill_large_shapes(self, pixels: Array, int64_t first_row, int64_t n_rows, colors: Array, int blend,
+                          bint is_premultiplied, Transfer transfer or None, const uint8_t[::1] ground,
+                          const int32_t[:, ::1] samples_fx) -> int:
         """The kernel `fill_large_shapes`."""
         cdef tl_canvas canvas
         cdef int64_t bad_row, width = pixels.shape[1]
@@ -365,6 +355,7 @@ cdef class SnappedMesh:
         canvas.n_channels, canvas.is_u8 = 1 if pixels.ndim == 2 else pixels.shape[2], pixels.dtype == np.uint8
         canvas.pixels = &flat[first_row * width * canvas.n_channels * (1 if canvas.is_u8 else 4)]
         canvas.stride_px, canvas.colors, canvas.ground, canvas.is_flat = width, data(palette), &ground[0], True
+        canvas.blend, canvas.is_premultiplied = <tl_blend>blend, is_premultiplied
         with nogil:
             bad_row = K.fill_large_shapes(&self.snapped, &window, &canvas, &samples_fx[0, 0], sample_bits, c_transfer)
         raise_if_given_up()

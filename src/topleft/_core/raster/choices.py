@@ -30,12 +30,6 @@ if TYPE_CHECKING:
 #: Sinks that give the same picture whatever the order of triangles.
 ORDER_FREE = frozenset({Sink.MASK, Sink.COUNT, Sink.NEAREST, Sink.FARTHEST, Sink.SAMPLES})
 
-#: Sinks that draw a few large triangles row by row, and the largest number of triangles.
-SHAPES_OF = {
-    Sink.MASK: engine.SHAPES_OF_BITS, Sink.SAMPLES: engine.SHAPES_OF_BITS, Sink.COUNT: engine.SHAPES_STORED,
-    Sink.LABEL: engine.SHAPES_STORED,
-}  # fmt: skip
-
 WORK_OF = {Sink.MASK: "bits", Sink.SAMPLES: "bits", Sink.COUNT: "counts", Sink.LABEL: "labels"}
 
 
@@ -366,7 +360,7 @@ def drawing(view: View, work: Work, sink: Sink) -> Drawing:
     """Return how a mesh is drawn."""
     n_threads = threads_to_draw(view, work, sink)
     sliced = is_sliced(view, work.n_triangles, n_threads, sink)
-    in_bands = pays_to_sort(view, work, sink) and not draws_large_shapes(view, work, sink, n_threads)
+    in_bands = pays_to_sort(view, work, sink)
     return Drawing(sink, n_threads, sliced and not in_bands, pays_to_bound(view, work, sink), in_bands)
 
 
@@ -473,7 +467,6 @@ class FillRoute(Enum):
 
     NOTHING = "no triangle, or no pixel"
     SHAPES = "row by row: a few large triangles"
-    BLENDED_SHAPES = "row by row, mixed with the colours below"
     BLENDED = "triangle by triangle, in their order"
     SAMPLES = "labels of the samples, then colours of the pixels"
     LABELS = "labels, then colours"
@@ -485,9 +478,8 @@ def fill_route(
     """Return how `fill` draws a mesh; `is_mixed`: with the colours below, `has_ground`: over one colour."""
     if not work.n_triangles or 0 in view.size:
         return FillRoute.NOTHING
-    shapes = blends_large_shapes if is_mixed else fills_large_shapes
-    if has_ground and shapes(view, work, colors, is_flat=is_flat):
-        return FillRoute.BLENDED_SHAPES if is_mixed else FillRoute.SHAPES
+    if has_ground and is_flat and fills_large_shapes(view, work, is_mixed=is_mixed):
+        return FillRoute.SHAPES
     if is_mixed or is_direct(view, work, colors.dtype, is_flat=is_flat):
         return FillRoute.BLENDED
     return FillRoute.SAMPLES if view.sampling.n_samples > 1 else FillRoute.LABELS
@@ -519,30 +511,11 @@ def earlier_wins(test: DepthTestOption | None, *, has_depth: bool) -> bool:
     return test is not None and has_depth
 
 
-def draws_large_shapes(view: View, work: Work, sink: Sink, n_threads: int) -> bool:
-    """Tell whether `draw` writes a picture row by row: so few triangles for the size of a thread's rows."""
-    is_known = sink in SHAPES_OF and view.sampling is not Sampling.AREA and not view.test
-    n_samples = view.sampling.n_samples if sink is Sink.SAMPLES else 1
-    width, height = view.size
-    return is_known and work.mesh.is_large_shapes(width, height // max(1, n_threads), n_samples, SHAPES_OF[sink])
-
-
-def fills_large_shapes(view: View, work: Work, colors: NDArray[Any], *, is_flat: bool) -> bool:
-    """Tell whether flat colours over a background are written row by row."""
+def fills_large_shapes(view: View, work: Work, *, is_mixed: bool) -> bool:
+    """Tell whether flat colours over one colour are filled row by row: few triangles for the size of the picture."""
     n_samples = view.sampling.n_samples
-    is_stored = n_samples == 1 and colors.dtype == np.uint8 and colors.shape[1:] == (4,)
-    most = engine.SHAPES_STORED if is_stored else engine.SHAPES_LABELLED
-    return is_flat and view.sampling is not Sampling.AREA and work.mesh.is_large_shapes(*view.size, n_samples, most)
-
-
-def blends_large_shapes(view: View, work: Work, colors: NDArray[Any], *, is_flat: bool) -> bool:
-    """Tell whether flat colours are blended over a background row by row.
-
-    By area four bytes a pixel are blended where they are, which is as fast for one triangle and faster for several.
-    """
-    is_in_place = colors.dtype == np.uint8 and colors.shape[1:] == (4,)
-    pays = is_flat and view.sampling.n_samples == 1 and not (view.sampling is Sampling.AREA and is_in_place)
-    return pays and work.mesh.blends_large_shapes(*view.size)
+    is_known = view.sampling is not Sampling.AREA and not (is_mixed and n_samples > 1)
+    return is_known and work.mesh.is_large_shapes(*view.size, n_samples)
 
 
 def is_direct(view: View, work: Work, dtype: np.dtype[Any], *, is_flat: bool) -> bool:

@@ -71,6 +71,11 @@ class Blending:
         return self.by_area or self.mode != "replace"
 
     @property
+    def codes(self) -> tuple[int, bool]:
+        """The mode as kernels know it, and whether colours have been multiplied by alpha."""
+        return BLEND_CODES[self.mode], self.alpha == "premultiplied"
+
+    @property
     def is_straight(self) -> bool:
         """Whether the mode treats the last channel as alpha that colours have not been multiplied by."""
         return self.has_alpha and self.alpha == "straight" and self.mode in ("over", "replace")
@@ -144,10 +149,14 @@ def draw_fill(
         )
         if ground is not None and not choices.lays_ground(route, view, palette, is_flat=is_flat):
             painting = painting.with_ground_laid()
-        if route in (FillRoute.BLENDED, FillRoute.BLENDED_SHAPES):
-            blend(painting, blending, is_large_shapes=route is FillRoute.BLENDED_SHAPES)
-        elif route is not FillRoute.NOTHING:
-            ROUTES[route](painting)
+        if route is FillRoute.SHAPES:
+            fill_large_shapes(painting, blending)
+        elif route is FillRoute.BLENDED:
+            blend(painting, blending)
+        elif route is FillRoute.SAMPLES:
+            paint_samples(painting)
+        elif route is FillRoute.LABELS:
+            paint(painting)
     view.mark("shade")
     return result
 
@@ -217,15 +226,16 @@ def colors_are_flat(n_colors: int, n_triangles: int, n_vertices: int, per: str) 
     raise ValueError(f"colors must have {wish}, got {n_colors}")
 
 
-def fill_large_shapes(p: Painting) -> None:
+def fill_large_shapes(p: Painting, blending: Blending) -> None:
     """Write every pixel once, row by row: a few large triangles."""
     n_samples, under = p.view.sampling.n_samples, cast("NDArray[np.uint8]", p.ground_bytes)
     grid_bits = p.view.grid_bits if n_samples > 1 else SAMPLE_GRID_BITS
     positions = sample_positions(n_samples, grid_bits)
 
     def fill_rows(first: int, end: int) -> int:
-        mesh = p.snapped.mesh
-        return mesh.fill_large_shapes(p.pixels, first, end - first, p.colors, p.transfer, under, positions)
+        return p.snapped.mesh.fill_large_shapes(
+            p.pixels, first, end - first, p.colors, *blending.codes, p.transfer, under, positions
+        )
 
     if max(run_parts(fill_rows, p.view.size[1], choices.threads_to_draw(p.view, p.snapped.work, Sink.LABEL))) >= 0:
         p.snapped.refuse()
@@ -269,13 +279,10 @@ def paint_samples(p: Painting) -> None:
         resolve_gouraud(p, samples, labels)
 
 
-ROUTES = {FillRoute.SHAPES: fill_large_shapes, FillRoute.SAMPLES: paint_samples, FillRoute.LABELS: paint}
-
-
-def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
+def blend(p: Painting, blending: Blending) -> None:
     """Blend coloured triangles; with several samples a pixel each sample is a picture.
 
-    A ground is there for uint8 with one sample a pixel, or for `is_large_shapes`.
+    A ground is there for uint8 with one sample a pixel.
     """
     work, n_samples = p.snapped.work, p.view.sampling.n_samples
     n_threads = choices.threads_to_draw(p.view, work, Sink.LABEL)
@@ -287,7 +294,7 @@ def blend(p: Painting, blending: Blending, *, is_large_shapes: bool) -> None:
         pictures[...] = p.pixels
     row_bytes = (4 if p.is_u8 else 4 * p.n_channels) * p.view.size[0]
     lays_ground = p.ground is not None
-    band_rows = 0 if is_large_shapes else choices.rows_to_blend(p.view, work, row_bytes, lays_ground=lays_ground)
+    band_rows = choices.rows_to_blend(p.view, work, row_bytes, lays_ground=lays_ground)
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_picture(p, mesh, picture, blending, n_threads, band_rows):
             p.snapped.refuse()
@@ -301,24 +308,21 @@ def blend_picture(
 ) -> bool:
     """Blend a mesh into a picture of one sample; returns whether a triangle has an index outside the vertices.
 
-    `band_rows`: so many are finished before the next; 0: a few large triangles, row by row.
+    `band_rows`: so many are finished before the next.
     """
     height, width = pixels.shape[:2]
     n_parts, n_channels, is_u8 = min(height, n_threads), p.n_channels, p.is_u8
     flat, palette, under = engine.as_bytes(pixels), engine.as_bytes(p.colors), p.ground_bytes
-    n_packed = width * (n_parts * engine.BLENDED_ROWS if band_rows == 0 else height)
-    packed = p.memory.scratch("packed", (n_packed,), np.int32) if is_u8 and n_channels != 4 else None
+    packed = p.memory.scratch("packed", (width * height,), np.int32) if is_u8 and n_channels != 4 else None
     n_cells = engine.blend_cells(width)
     cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
-    code, is_premultiplied = BLEND_CODES[blending.mode], blending.alpha == "premultiplied"
 
     def blend_part(i: int, _: int) -> int:
         first, end = height * i // n_parts, height * (i + 1) // n_parts
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
-        room = packed[engine.BLENDED_ROWS * width * i :] if packed is not None and band_rows == 0 else packed
         return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, p.is_flat,
-            code, is_premultiplied, band_rows, under, room, own, is_large_shapes=band_rows == 0,
+            *blending.codes, band_rows, under, packed, own,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0

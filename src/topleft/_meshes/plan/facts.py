@@ -83,7 +83,7 @@ class Facts:
     n_pieces: int
     common_depth: float | None  # of all vertices
     is_direct: bool  # uint8 colours of triangles are stored without labels in between
-    is_large_shapes: bool  # large triangles, whose picture is written row by row
+    is_large_shapes: bool  # a few large triangles, whose colours are filled row by row
     work_ms: float  # of a single thread, as estimated before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
     decided: Decided | None = None  # with vertices that are not snapped
@@ -162,13 +162,10 @@ def find_facts(
     route, drawing = None, choices.drawing(view, snapped.work, find_sink(verb, view))
     if verb == "rasterize":
         route, drawing = choices.route(view, snapped.work, test, wants_depth=False)
-    filling, is_large_shapes = None, False
+    filling = None
     if verb == "fill":  # with RGBA, a colour of each triangle
         rgba = np.zeros((snapped.n_triangles, 4), np.uint8)
         filling = choices.fill_route(view, snapped.work, rgba, is_flat=True, is_mixed=False, has_ground=True)
-        is_large_shapes = filling is FillRoute.SHAPES
-    elif view.sampling.n_samples == 1 or drawing.sink is Sink.SAMPLES:
-        is_large_shapes = choices.draws_large_shapes(view, snapped.work, drawing.sink, drawing.n_threads)
     common = choices.common_depth(points, has_depth=snapped.work.has_depth, is_clip_space=source.is_clip_space)
     samples = sample_positions(view.sampling.n_samples, view.grid_bits) if drawing.sink is Sink.SAMPLES else None
     census = [(0, 0.0, 0.0)] * len(CLASSES)
@@ -197,7 +194,7 @@ def find_facts(
         n_pieces=len(pieces) if pieces else 0,
         common_depth=common,
         is_direct=filling is FillRoute.BLENDED,
-        is_large_shapes=is_large_shapes,
+        is_large_shapes=filling is FillRoute.SHAPES,
         work_ms=choices.work_ns(view, snapped.work, drawing.sink) / 1e6,
         census=tuple(census),
         decided=decided,

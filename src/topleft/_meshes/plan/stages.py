@@ -283,7 +283,7 @@ def plan_sink(facts: Facts) -> Iterator[Stage]:
         choice = f"{choice}, a picture of each"
         rejected = ("all samples of a band of rows before the next: the whole mesh would be snapped and sorted first",)
     yield Stage("sampling", choice, why, rejected, timed_in="method")
-    if facts.is_direct or (facts.is_large_shapes and facts.verb == "fill"):
+    if facts.is_direct or facts.is_large_shapes:
         why = "triangles are few for the picture: their colours go straight to it"
         rejected = ("labels and colours from them: two passes over the picture, which pay for small triangles",)
         yield Stage("shade", "none", why, rejected, timed_in="method")

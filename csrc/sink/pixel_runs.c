@@ -1,9 +1,7 @@
-/* Runs: a row of a picture as runs of pixels that hold the same, and how they get into memory.
- * In: spans of triangles.  Out: pixels, each written once.
- *
- * A run has a key: a mask's bit, a count, a label, or the labels of all samples of its pixels, side by side. */
-#ifndef TL_ROW_RUNS_C
-#define TL_ROW_RUNS_C
+/* Runs of pixels that hold one value, each written once; a run may go on in the next row.
+ * In: runs, from the first pixel of some rows on.  Out: pixels. */
+#ifndef TL_PIXEL_RUNS_C
+#define TL_PIXEL_RUNS_C
 
 #include <stdint.h>
 #include <string.h>
@@ -11,74 +9,6 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-
-/* Run k is [col[k], col[k + 1]). */
-typedef struct {
-    int n;
-    int32_t col[2 * TL_SHAPE_SLOTS + 2];
-    uint64_t key[2 * TL_SHAPE_SLOTS + 2];
-} row_runs;
-
-/* How a triangle changes the key of the pixels that it covers. */
-typedef enum {
-    KEY_REPLACE, /* the bits of its sample become its own */
-    KEY_COUNT,   /* one more */
-    KEY_LATER,   /* the larger label stays */
-} key_change;
-
-TL_INLINE void start_row(row_runs *r, int64_t width, uint64_t key)
-{
-    r->n = 1, r->col[0] = 0, r->col[1] = (int32_t)width, r->key[0] = key;
-}
-
-/* Cuts run k in two at a column inside of it. */
-TL_INLINE void cut_run(row_runs *r, int k, int32_t col)
-{
-    uint64_t key = r->key[k];
-    r->n++;
-    for (int i = k + 1; i <= r->n; i++) { /* no memmove: few, and just written */
-        const int32_t next_col = r->col[i];
-        const uint64_t next_key = r->key[i];
-        r->col[i] = col, r->key[i] = key;
-        col = next_col, key = next_key;
-    }
-}
-
-TL_INLINE uint64_t changed_key(uint64_t key, key_change change, uint64_t bits, uint64_t own)
-{
-    if (change == KEY_REPLACE)
-        return (key & ~bits) | own;
-    if (change == KEY_COUNT)
-        return key + 1;
-    return (int64_t)own > (int64_t)key ? own : key;
-}
-
-/* A span of a triangle: `own` where `bits` are set. */
-TL_INLINE void lay_span(row_runs *r, int32_t first, int32_t end, key_change change, uint64_t bits, uint64_t own)
-{
-    int k = 0;
-    if (r->n == 1) { /* the first one of the row */
-        const uint64_t key = r->key[0];
-        const int32_t width = r->col[1];
-        k = first > 0;
-        r->col[k] = first, r->key[k] = changed_key(key, change, bits, own);
-        r->col[k + 1] = end, r->key[k + 1] = key;
-        r->n = k + 1 + (end < width);
-        r->col[r->n] = width;
-        return;
-    }
-    while (r->col[k + 1] <= first)
-        k++;
-    if (r->col[k] < first)
-        cut_run(r, k++, first);
-    for (; k < r->n && r->col[k] < end; k++) {
-        if (r->col[k + 1] > end)
-            cut_run(r, k, end);
-        r->key[k] = changed_key(r->key[k], change, bits, own);
-    }
-}
-
-/* ---- pixels ------------------------------------------------------------------------------------------------------ */
 
 /* n > 0 pixels of one value.  Vectors begin at multiples of their size, for a store across two cache lines takes twice
  * as long; `may_overrun`: it may write up to one vector past n; the caller overwrites that. */
@@ -99,20 +29,6 @@ TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_over
         vi_store(p, values);
     if (!may_overrun)
         vi_store(end - TL_LANES, values);
-}
-
-/* n > 0 bytes of one value; `may_overrun` as of put_words. */
-TL_INLINE void put_bytes(uint8_t *pixels, int64_t n, uint8_t value, int may_overrun)
-{
-    const int64_t size = 4 * TL_LANES;
-    if (!may_overrun || TL_LANES == 1) {
-        memset(pixels, value, (size_t)n);
-        return;
-    }
-    uint8_t *const aligned = pixels + size - (uintptr_t)pixels % (uintptr_t)size;
-    vi_store((int32_t *)(void *)pixels, vi_set1((int32_t)(value * 0x01010101u)));
-    if (pixels + n > aligned)
-        put_words((int32_t *)(void *)aligned, (pixels + n - aligned + 3) >> 2, (int32_t)(value * 0x01010101u), 1);
 }
 
 /* n > 0 pixels of one value and of any size. */
@@ -180,7 +96,7 @@ TL_INLINE void close_run(const open_run *run, int pixel_bytes)
         return;
     memcpy(&word, run->value, 4);
     if (pixel_bytes == 1)
-        put_bytes((uint8_t *)pixels, n, (uint8_t)run->value[0], may_overrun);
+        memset(pixels, run->value[0], (size_t)n);
     else if (pixel_bytes == 4)
         put_words((int32_t *)(void *)pixels, n, word, may_overrun);
     else if (pixel_bytes % 3)
