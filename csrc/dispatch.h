@@ -1,8 +1,26 @@
-/* Which kernel units were built, which of them this CPU can run, and their tables. */
+/* The whole contract between the kernels and their callers: the headers of the rooms, the kernel table, which
+ * instruction sets were built, and which of them this CPU can run. */
 #ifndef TL_DISPATCH_H
 #define TL_DISPATCH_H
 
 #include "topleft.h"
+#include "vertex/exact.h"
+#include "clusters/clusters.h"
+#include "mesh/faces.h"
+#include "mesh/lens.h"
+#include "mesh/nearest.h"
+#include "pixels/shading.h"
+#include "grad/grad.h"
+#include "polygons/polygons.h"
+#include "tiles/tiles.h"
+#include "grid/grid.h"
+
+/* The table of an instruction set: the kernels of kernels.h. */
+typedef struct tl_kernels {
+    const char *isa;
+#define TL_KERNEL(result, name, ...) result (*name)(__VA_ARGS__);
+#include "kernels.h"
+} tl_kernels;
 
 /* From the plainest to the widest: the last one that is available is the one to take. */
 enum { TL_ISA_SCALAR, TL_ISA_SIMD128, TL_ISA_AVX2, TL_ISA_AVX512, TL_N_ISA };

@@ -1,7 +1,7 @@
 /* The kernel table of one instruction set, with its units compiled together and only the table visible.
  * isa_*.c define the name of the set (TL_ISA_NAME) and of the table (TL_KERNELS) and include this file.  `setup.py`
  * compiles each unit by itself instead, in parallel and only if its files change. */
-#include "topleft.h"
+#include "dispatch.h"
 
 #include "unit_raster.c"
 #include "unit_pixels.c"

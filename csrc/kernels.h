@@ -1,7 +1,7 @@
-/* The kernels of an instruction set: TL_KERNEL(result, name, parameters ...), a member of the table at the end of
- * topleft.h.  Each section has the kernels of one unit: unit_*.c includes their code, and the build compiles each unit
- * by itself.  Where TL_KERNELS_OF is defined, only that section is read.  Part of the contract of topleft.h. */
-#include "topleft.h" /* for the types, where this file is read without topleft.h */
+/* The kernels of an instruction set: TL_KERNEL(result, name, parameters ...), a member of the table of dispatch.h.
+ * Each section has the kernels of one unit: unit_*.c includes their code, and the build compiles each unit by itself.
+ * Where TL_KERNELS_OF is defined, only that section is read. */
+#include "dispatch.h" /* for the types, where this file is read by itself */
 
 #define TL_UNIT_raster 1
 #define TL_UNIT_pixels 2

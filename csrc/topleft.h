@@ -1,4 +1,5 @@
-/* The contract between the kernels and their callers: types with units, status codes, the kernel table.
+/* The contract between the kernels and their callers, as far as several rooms share it: types with units, status codes.
+ * A header in a room adds the types of that room; `dispatch.h` has all, and the kernel table.
  *
  * A kernel allocates nothing, touches no Python object and keeps no state; every buffer is the caller's.
  * Names carry their space: _px pixels (y down, centres at +0.5), _fx fixed point, _clip homogeneous clip space.
@@ -8,12 +9,6 @@
 
 #include <stddef.h>
 #include <stdint.h>
-
-#include "atlas.h"
-#include "faces.h"
-#include "lens.h"
-#include "nearest.h"
-#include "tiles.h"
 
 /* The value for no data.  Its sign bit is 0; that of Microsoft's NAN depends on the compiler. */
 #define TL_NAN __builtin_nan("")
@@ -540,18 +535,5 @@ typedef struct {
 
 /* The most bytes of n_rows in the file: codes of 12 bits; tables, and what is written past the end. */
 static inline int64_t tl_png_room(int64_t n_rows, int64_t n_bytes) { return n_rows * (1 + n_bytes) * 3 / 2 + 256; }
-
-#include "clusters.h"
-#include "exact.h"
-#include "grad.h"
-#include "polygons.h"
-#include "shading.h"
-
-/* The table of an instruction set: the kernels of kernels.h. */
-typedef struct tl_kernels {
-    const char *isa;
-#define TL_KERNEL(result, name, ...) result (*name)(__VA_ARGS__);
-#include "kernels.h"
-} tl_kernels;
 
 #endif

@@ -1,7 +1,7 @@
 /* The end of each unit.  The build compiles it with TL_UNIT and TL_ISA, the names of the unit and of the set: it then
  * defines one function, which stores the unit's kernels in a table, and no other symbol, so that no code of a wider set
  * can replace the baseline's.  Without them it is a part of kernels.c. */
-#include "topleft.h"
+#include "dispatch.h"
 
 #ifdef TL_UNIT
 #define TL_JOIN(a, b, c) a##b##c

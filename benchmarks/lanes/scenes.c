@@ -8,7 +8,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "topleft.h"
+#include "dispatch.h"
 
 extern const tl_kernels TL_KERNELS_HERE;
 static const tl_kernels *const k = &TL_KERNELS_HERE;

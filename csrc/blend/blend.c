@@ -15,6 +15,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
 #include "raster/single_float.c"

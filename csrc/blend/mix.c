@@ -12,6 +12,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
 #include "exact/pieces.c"

@@ -12,8 +12,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "clusters.h"
 #include "topleft.h"
+#include "clusters/clusters.h"
 
 #define TL_CURVE_BITS 10 /* cells a side: 1024; a surface meets some millions of them */
 

@@ -15,12 +15,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 #include "clusters/behind.h"
+#include "clusters/clusters.h"
 
 /* Row i of the matrix over a box: its value at the centre, its largest deviation from it, and a bound of the sum of its
  * absolute terms. */

@@ -11,6 +11,7 @@
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 #include "exact/sign.c"

@@ -16,6 +16,7 @@
 
 #include "topleft.h"
 #include "lanes/inline.h"
+#include "vertex/exact.h"
 
 typedef struct {
     double x, y;

@@ -15,6 +15,7 @@
 
 #include "topleft.h"
 #include "lanes/inline.h"
+#include "grad/grad.h"
 
 /* The gradient of the area of a triangle in a pixel. */
 TL_INLINE double area_gradient(const tl_grad_area *p, int64_t triangle, int64_t pixel)

@@ -13,6 +13,7 @@
 
 #include "topleft.h"
 #include "grad/faces.c"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "grad/points.c"
 #include "grad/values.c"

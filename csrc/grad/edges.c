@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/outline.c"
 #include "grad/pairs.c"
 #include "grad/pixels.h"

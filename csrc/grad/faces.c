@@ -11,6 +11,7 @@
 
 #include "topleft.h"
 #include "grad/edges.c"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "grad/points.c"
 #include "lanes/lanes.h"

@@ -11,6 +11,7 @@
 
 #include "topleft.h"
 #include "grad/cube.c"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 

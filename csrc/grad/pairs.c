@@ -16,6 +16,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/outline.c"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"

@@ -16,6 +16,7 @@
 #include "grad/colors.c"
 #include "grad/edges.c"
 #include "grad/faces.c"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "grad/points.c"
 #include "grad/values.c"

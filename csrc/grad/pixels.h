@@ -9,6 +9,7 @@
 
 #include "topleft.h"
 #include "lanes/inline.h"
+#include "grad/grad.h"
 
 /* Bits of `outline` of a triangle; -1: it does not exist. */
 enum {

@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "lanes/lanes.h"
 #include "lanes/quads.h"

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/looks.c"
 #include "grad/pixels.h"
 #include "grad/spans.h"

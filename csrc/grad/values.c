@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "topleft.h"
+#include "grad/grad.h"
 #include "grad/pixels.h"
 #include "grad/spans.h"
 #include "lanes/lanes.h"

@@ -13,6 +13,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
+#include "grid/grid.h"
 
 #define TL_MOST_PART 7 /* corners of a triangle cut by four lines */
 

@@ -14,6 +14,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "grid/grid.h"
 
 TL_INLINE double max_of(double a, double b) { return a > b ? a : b; }
 TL_INLINE double min_of(double a, double b) { return a < b ? a : b; }

@@ -19,6 +19,7 @@
 #include "lanes/lanes.h"
 #include "mesh/lens.c"
 #include "vertex/corners.h"
+#include "mesh/lens.h"
 
 /* A corner of a part. */
 typedef struct {

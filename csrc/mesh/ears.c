@@ -20,9 +20,9 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "faces.h"
 #include "topleft.h"
 #include "base/sort_pairs.h"
+#include "mesh/faces.h"
 
 #define TL_EAR_LEVELS 11 /* of either tree: 8^11 is more than int32 corners */
 #define TL_EAR_STEPS_TO_POLL 16384

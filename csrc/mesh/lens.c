@@ -13,6 +13,7 @@
 #include "topleft.h"
 #include "lanes/angle.h"
 #include "lanes/lanes.h"
+#include "mesh/lens.h"
 
 #define TL_PI 0x1.921fb54442d18p+1
 #define TL_LEAST_RANGE 0x1p-1022

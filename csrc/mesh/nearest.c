@@ -13,8 +13,8 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "nearest.h"
 #include "lanes/lanes.h"
+#include "mesh/nearest.h"
 
 /* The nearest point of the surface to a point. */
 typedef struct {

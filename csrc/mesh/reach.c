@@ -17,9 +17,9 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "nearest.h"
 #include "lanes/lanes.h"
 #include "mesh/nearest.c"
+#include "mesh/nearest.h"
 
 enum {
     TL_PIECE_CORNERS = 12,

@@ -9,10 +9,10 @@
 
 #include <stdint.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 
 /* The last of n instances with a first id <= `id`, or the first instance; first_ids, or NULL to read `instances`. */
 TL_INLINE int64_t last_begun(const int64_t *first_ids, const tl_shaded *instances, int64_t n, int64_t id)

@@ -11,12 +11,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "pixels/instances.c"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "pixels/weights.c"
 
 typedef struct {

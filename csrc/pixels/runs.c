@@ -16,13 +16,14 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "vertex/project.c"
 #include "vertex/setup.c"
 #include "exact/sign.c"
+#include "pixels/shading.h"
 
 #define TL_SPAN 512 /* pixels of a row that are shaded together */
 #define TL_SPAN_ROOM (TL_SPAN + 2 * TL_MAX_LANES)

@@ -14,8 +14,8 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "lanes/lanes.h"
+#include "pixels/shading.h"
 
 /* A larger float64 has no fraction; NaN maps to texel 0. */
 #define TL_LAST_FRACTION 0x1p52

@@ -12,6 +12,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "exact/pieces.c"
 #include "exact/sign.c"
 

@@ -8,6 +8,7 @@
 
 #include "topleft.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 #include "vertex/setup.c"

@@ -14,10 +14,10 @@
 
 #include <stdint.h>
 
-#include "polygons.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 
 /* Edges of at most so many rows are walked a vector of edges at a time, longer edges a vector of rows at a time: 4 and
  * 8 are slower. */

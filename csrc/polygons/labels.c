@@ -11,10 +11,10 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "polygons.h"
 #include "lanes/lanes.h"
 #include "polygons/crossings.c"
 #include "polygons/mask.c"
+#include "polygons/polygons.h"
 #include "polygons/row_bits.c"
 #include "polygons/touched.c"
 

@@ -10,9 +10,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "polygons.h"
 #include "lanes/lanes.h"
 #include "polygons/crossings.c"
+#include "polygons/polygons.h"
 #include "polygons/row_bits.c"
 
 #define TL_SORTED_CROSSINGS 8 /* in a row; with more, sums by column are faster: a star of a million corners */

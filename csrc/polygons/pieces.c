@@ -11,11 +11,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "polygons.h"
 #include "base/sort_pairs.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 #include "polygons/slabs.c"
 
 /* Cuts edges at the rows [top, bottom); with pieces = NULL only counts the pieces of each row. */

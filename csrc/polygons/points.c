@@ -7,10 +7,10 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "polygons.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
+#include "polygons/polygons.h"
 
 /* A coordinate from the window's corner in sub-pixels; 0 when it is not finite or out of range. */
 static int snap_exactly(const tl_source *source, int64_t i, int bits, int grid_bits, int64_t corner_px, int64_t *out)

@@ -11,7 +11,6 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "polygons.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "area/area.c"
@@ -19,6 +18,7 @@
 #include "polygons/crossings.c"
 #include "polygons/pieces.c"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 
 #define TL_WHOLE (1 << TL_AREA_BITS)
 

@@ -18,12 +18,12 @@
 
 #include <stdint.h>
 
-#include "polygons.h"
 #include "base/sort_pairs.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/crossings.c"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 
 /* Edges of a leaf; tl_certify_words depends on it.  32 saves a fifth on noisy rings, and costs a third more on
  * contours. */

@@ -17,9 +17,9 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "polygons.h"
 #include "base/sort_pairs.h"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 
 #define TL_THIN 0x1p-44 /* px of height */
 

@@ -8,11 +8,11 @@
 
 #include <stdint.h>
 
-#include "polygons.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "polygons/pieces.c"
 #include "polygons/points.c"
+#include "polygons/polygons.h"
 #include "polygons/row_bits.c"
 
 #define TL_NO_SHARE 0x1p-40 /* smaller shares of a pixel are rounding, see pieces.c */

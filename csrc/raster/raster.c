@@ -7,14 +7,15 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "clusters.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
 #include "vertex/snap.c"
 #include "clusters/cluster_view.c"
+#include "clusters/clusters.h"
 #include "sink/census.c"
 #include "sink/covered.c"
 #include "sink/peel.c"

@@ -9,6 +9,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/exact.h"
 #include "exact/sign.c"
 #include "sink/sink.c"
 #include "raster/state.h"

@@ -9,6 +9,7 @@
 #include "topleft.h"
 #include "vertex/clip.c"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/setup.c"
 #include "exact/sign.c"
 

@@ -14,6 +14,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/setup.c"
 #include "exact/sign.c"
 #include "sink/sink.c"

@@ -11,6 +11,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/setup.c"
 #include "sink/fragments.h"
 #include "sink/sink.c"

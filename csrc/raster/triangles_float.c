@@ -46,6 +46,7 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/project.c"
 #include "vertex/setup.c"
 #include "exact/sign.c"

@@ -10,7 +10,6 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/clip.c"
@@ -20,6 +19,7 @@
 #include "sink/peel.c"
 #include "raster/raster.c"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/full.c"
 #include "shade/shade_pixels.c"
 #include "shade/span_list.c"

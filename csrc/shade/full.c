@@ -12,9 +12,9 @@
 #ifndef TL_FULL_C
 #define TL_FULL_C
 
-#include "shading.h"
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/light.c"
 #include "shade/metallic.c"
 #include "shade/surroundings.c"

@@ -6,8 +6,8 @@
 #ifndef TL_LIGHT_C
 #define TL_LIGHT_C
 
-#include "shading.h"
 #include "lanes/lanes.h"
+#include "pixels/shading.h"
 #include "shade/texture.c"
 
 typedef struct {

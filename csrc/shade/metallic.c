@@ -19,8 +19,8 @@
 #ifndef TL_METALLIC_C
 #define TL_METALLIC_C
 
-#include "shading.h"
 #include "lanes/lanes.h"
+#include "pixels/shading.h"
 #include "shade/light.c"
 #include "shade/surroundings.c"
 

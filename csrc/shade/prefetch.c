@@ -6,9 +6,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "shading.h"
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/full.c"
 #include "shade/shade_pixels.c"
 #include "shade/texture.c"

@@ -7,12 +7,12 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "pixels/weights.c"
 #include "shade/light.c"
 #include "shade/prefetch.c"

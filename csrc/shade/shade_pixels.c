@@ -6,11 +6,11 @@
 #include <math.h>
 #include <stdint.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/corners.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/full.c"
 #include "shade/light.c"
 #include "shade/texture.c"

@@ -8,11 +8,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/prefetch.c"
 #include "shade/shade.c"
 #include "shade/span_list.c"

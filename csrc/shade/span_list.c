@@ -6,11 +6,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "shading.h"
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "pixels/instances.c"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/full.c"
 #include "shade/prefetch.c"
 #include "shade/srgb.c"

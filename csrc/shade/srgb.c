@@ -11,9 +11,9 @@
 #ifndef TL_SRGB_C
 #define TL_SRGB_C
 
-#include "shading.h"
 #include "lanes/lanes.h"
 #include "pixels/runs.c"
+#include "pixels/shading.h"
 #include "shade/light.c"
 #include "shade/shade_pixels.c"
 

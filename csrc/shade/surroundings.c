@@ -16,8 +16,8 @@
 
 #include <stdint.h>
 
-#include "shading.h"
 #include "lanes/lanes.h"
+#include "pixels/shading.h"
 #include "shade/light.c"
 
 #define SPREAD_1 1.6f /* of alpha^2: 4 / (1 + 1.6 alpha + 1.4 alpha^2) */

@@ -7,8 +7,8 @@
 
 #include <stdint.h>
 
-#include "shading.h"
 #include "lanes/lanes.h"
+#include "pixels/shading.h"
 
 /* log2 of positive numbers, with a relative error of 2^-22, near 1 relative to the distance from 1; of 0: -127. */
 TL_INLINE vf vf_log2(vf a)

@@ -8,6 +8,7 @@
 
 #include "topleft.h"
 #include "lanes/inline.h"
+#include "tiles/tiles.h"
 
 /* n_bytes is a constant at each call, so that a row is copied by one or two moves. */
 TL_INLINE int64_t copy_corners(const tl_corners *c, const int32_t *which, int64_t first, int64_t n, char *out,

@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "topleft.h"
+#include "tiles/tiles.h"
 
 /* No branch inside the loops, so that the compiler vectorises. */
 static void merge_fragments(const tl_merge *m, int64_t first, int64_t end)

@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "topleft.h"
+#include "tiles/tiles.h"
 
 #define TL_SPAN_MARGIN_PX 2.0
 #define TL_SPAN_SLACK 0x1p-44

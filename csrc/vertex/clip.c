@@ -9,6 +9,7 @@
 
 #include "topleft.h"
 #include "vertex/corners.h"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/project.c"
 

@@ -10,6 +10,7 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/exact.h"
 #include "vertex/fixed.h"
 #include "vertex/snap.c"
 

@@ -13,7 +13,7 @@ CSRC = Path(__file__).resolve().parents[2] / "csrc"
 FILES = sorted(path.relative_to(CSRC).as_posix() for path in CSRC.rglob("*.[ch]"))
 FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
 
-#: From the lowest floor to the highest. A folder includes those of lower floors, its own files, and headers beside it.
+#: From the lowest floor to the highest. A folder includes its files, those of lower floors, and topleft.h.
 LADDER = (
     ("base",), ("lanes",), ("vertex",), ("clusters", "exact", "mesh"), ("sink",), ("raster",), ("area", "points"),
     ("pixels",), ("blend", "grad", "lines", "polygons", "shade", "tiles"), ("grid",),
@@ -43,9 +43,9 @@ def may_include(name: str, other: str) -> bool:
     """Tell whether the ladder lets a file include another one."""
     folder, other_folder = name.rpartition("/")[0], other.rpartition("/")[0]
     if not other_folder:
-        return not folder or (other.endswith(".h") and other != "unit.h")
+        return not folder or other == "topleft.h"
     if not folder:
-        return name.startswith("unit_")
+        return name.startswith("unit_") or (name == "dispatch.h" and other.endswith(".h"))
     return folder == other_folder or FLOORS[other_folder] < FLOORS[folder]
 
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "topleft.h"
+#include "dispatch.h"
 
 #ifdef _WIN32 /* where C11's names are not */
 #include <malloc.h>

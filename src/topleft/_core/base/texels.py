@@ -24,7 +24,7 @@ from topleft.typing import EncodingOption, FilterOption, WrapOption
 MOST_KEPT_BYTES = 1 << 27
 """The most bytes of levels that are kept with a texture; 2048 x 2048 texels of four channels take 2/3 of it."""
 
-FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/shading.h
+FILTER_CODES = {"nearest": 0, "bilinear": 1, "trilinear": 2, "pixelated": 3}  # tl_filter in csrc/pixels/shading.h
 WRAP_CODES = {"repeat": 0, "clamp": 1, "mirror": 2}  # tl_wrap
 HALVING = ("trilinear", "pixelated")
 """Filters that look at halvings of the picture."""

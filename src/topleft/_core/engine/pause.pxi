@@ -2,7 +2,7 @@
 
 cdef extern from *:
     """
-    #include "topleft.h"
+    #include "dispatch.h"
 
     /* The state of a thread from which `poll` decides whether its kernel stops. */
     typedef struct {

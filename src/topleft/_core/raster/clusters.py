@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.threads import count_threads, run_parts
 
-#: `tl_cluster` of csrc/clusters.h.
+#: `tl_cluster` of csrc/clusters/clusters.h.
 RECORD = np.dtype([("low", np.float64, 3), ("high", np.float64, 3), ("axis", np.float64, 3), ("cone_cos", np.float64),
                    ("min_area", np.float64), ("min_height", np.float64), ("first_triangle", np.int64),
                    ("first_vertex", np.int64), ("n_triangles", np.int32), ("n_vertices", np.int32)])  # fmt: skip
@@ -119,7 +119,7 @@ class SortedClusters(NamedTuple):
     """Triangles in clusters that are not measured yet."""
 
     records: NDArray[np.uint8]
-    """`tl_cluster` of ``csrc/clusters.h``, one after the other."""
+    """`tl_cluster` of ``csrc/clusters/clusters.h``, one after the other."""
     vertices: NDArray[np.int32]
     """(N,) the vertices of the mesh cluster by cluster, vertices on borders several times."""
     corners: NDArray[np.uint8]

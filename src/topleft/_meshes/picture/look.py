@@ -35,7 +35,7 @@ from topleft._meshes.model.normals import (
 )
 from topleft._meshes.model.texture import Texture
 
-LIGHT_CODES = {"directional": 0, "point": 1, "spot": 3}  # tl_light_kind in csrc/shading.h
+LIGHT_CODES = {"directional": 0, "point": 1, "spot": 3}  # tl_light_kind in csrc/pixels/shading.h
 
 MOST_STRETCHED = 1 << 18
 """Vertices of stretched copies that are kept of a mesh, 40 bytes each and 20 for each of its triangles."""
@@ -43,7 +43,7 @@ MOST_STRETCHED = 1 << 18
 
 @dataclass(frozen=True, eq=False)
 class CameraRays:
-    """The camera's fields of `tl_shading` in csrc/shading.h, in a shading space with its origin at `center`."""
+    """The camera's fields of `tl_shading` in csrc/pixels/shading.h, in a shading space with its origin at `center`."""
 
     has_perspective: bool
     eye: F64  # (3,): where the camera is; without perspective the unit vector to it

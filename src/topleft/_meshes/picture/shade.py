@@ -41,7 +41,7 @@ MIN_PX_PER_THREAD = 1 << 14
 """Pixels whose light is worth a thread: a tenth of a millisecond. A scene is shaded instance by instance."""
 
 
-SHOW_CODES = {"normals": 1, "matcap": 2}  # tl_show in csrc/shading.h; light: 0
+SHOW_CODES = {"normals": 1, "matcap": 2}  # tl_show in csrc/pixels/shading.h; light: 0
 NUMBERS = frozenset({"ids", "depth"})
 """Modes that colour numbers of the buffer, without light."""
 

@@ -1,5 +1,4 @@
-/* The contract of lenses: how a lens bends directions, and the triangles of its picture.  Part of the contract of
- * topleft.h, which includes it.
+/* The contract of lenses: how a lens bends directions, and the triangles of its picture.
  *
  * Axes are those of OpenCV: x right, y down, z along the view; the image plane lies at z = 1.  "Eye space" has y up and
  * looks along -z. */

@@ -1,4 +1,4 @@
-/* The contract of faces with any number of corners, which are cut into triangles.  Part of topleft.h. */
+/* The contract of faces with any number of corners, which are cut into triangles. */
 #ifndef TOPLEFT_FACES_H
 #define TOPLEFT_FACES_H
 

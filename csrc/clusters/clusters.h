@@ -1,9 +1,10 @@
-/* Clusters of a mesh in object space, and a view of them.  Part of the contract of
- * topleft.h, which includes it behind the types that it uses. */
-#include "topleft.h" /* before the guard: it includes this file behind its types */
-
+/* The contract of clusters: a mesh in object space, and a view of it. */
 #ifndef TOPLEFT_CLUSTERS_H
 #define TOPLEFT_CLUSTERS_H
+
+#include <stdint.h>
+
+#include "topleft.h"
 
 /* A mesh in object space, sorted into clusters: a few neighbouring triangles, with their vertices stored together. */
 

@@ -1,4 +1,4 @@
-/* Exact drawing: vertices that are not snapped.  Part of the contract of topleft.h, which includes it. */
+/* The contract of exact drawing: vertices that are not snapped. */
 #ifndef TOPLEFT_EXACT_H
 #define TOPLEFT_EXACT_H
 

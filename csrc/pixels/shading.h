@@ -1,10 +1,11 @@
 /* The contract of shading: the material of a surface, its lights, and the eye. Colours are linear light, 1 is white.
  * All vectors are in one space, the shading space, with its origin near the mesh. */
-#include "topleft.h" /* before the guard: it includes this file behind its types */
 #ifndef TOPLEFT_SHADING_H
 #define TOPLEFT_SHADING_H
 
 #include <stdint.h>
+
+#include "topleft.h"
 
 #define TL_MAX_LEVELS 16
 

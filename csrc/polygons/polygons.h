@@ -1,4 +1,4 @@
-/* Polygons: rings of points, and how they are drawn.  Part of the contract of topleft.h, which includes it. */
+/* The contract of polygons: rings of points, and how they are drawn. */
 #ifndef TOPLEFT_POLYGONS_H
 #define TOPLEFT_POLYGONS_H
 

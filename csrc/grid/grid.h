@@ -1,6 +1,6 @@
 /* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and the viewshed of a height grid. */
-#ifndef TL_ATLAS_H
-#define TL_ATLAS_H
+#ifndef TOPLEFT_GRID_H
+#define TOPLEFT_GRID_H
 
 #include <stdint.h>
 
