@@ -52,9 +52,6 @@ typedef struct {
     int64_t at;     /* the sample of column 0; columns outside [first, end) are not drawn */
     int32_t stride, n_rows, first, end;
     int has_left; /* the four cells before column 0 count */
-    /* a bit for each TL_MET_CELLS cells of the rows, from met_at on: whether an edge meets them; NULL: not known */
-    const uint64_t *met;
-    int64_t met_at;
 } cell_block;
 
 /* Returns the sum of the four cells left of column 0, and clears them. */
@@ -66,42 +63,6 @@ TL_INLINE int32_t take_left_cells(int32_t *cells)
         cells[k] = TL_CELL_ZERO;
     }
     return sum;
-}
-
-/* Blends columns [col, end) of a row that no edge meets: `sum` is the area of each pixel. */
-TL_INLINE void blend_even(blend_state *b, int64_t at, int64_t col, int64_t end, int32_t sum, int is_u8, tl_mix mode)
-{
-    if (sum >= TL_WHOLE) {
-        mix_pixels(b, at + col, end - col);
-        return;
-    }
-    for (; sum > 0 && col < end; col += TL_LANES)
-        mix_block(b, at + col, vm_first(end - col), vi_set1(sum), is_u8, mode);
-}
-
-/* `blend_cells` for rows with bits of the cells that edges meet: only those cells are read. */
-TL_INLINE void blend_met_cells(blend_state *b, const cell_block *c, int is_u8, tl_mix mode)
-{
-    const vi bias = vi_set1(TL_CELL_ZERO);
-    const int64_t n_lines = (c->end + TL_MET_CELLS - 1) / TL_MET_CELLS;
-    for (int64_t row = 0; row < c->n_rows; row++) {
-        int32_t *const cells = c->cells + row * c->stride, last[TL_MAX_LANES];
-        const int64_t at = c->at + row * b->stride, line0 = c->met_at + row * (c->stride / TL_MET_CELLS);
-        int32_t sum = take_left_cells(cells);
-        for (int64_t line = 0; line < n_lines; line++) {
-            const int64_t met = next_met(c->met, line0 + line, line0 + n_lines) - line0;
-            if (met > line)
-                blend_even(b, at, line * TL_MET_CELLS, min64(met * TL_MET_CELLS, c->end), sum, is_u8, mode);
-            line = met;
-            for (int64_t col = met * TL_MET_CELLS; col < min64((met + 1) * TL_MET_CELLS, c->end); col += TL_LANES) {
-                const vi sums = vi_add(vi_prefix_sum(vi_sub(vi_load(cells + col), bias)), vi_set1(sum));
-                vi_store(cells + col, bias);
-                vi_store(last, sums);
-                sum = last[TL_LANES - 1];
-                mix_block(b, at + col, vm_first(c->end - col), sums, is_u8, mode);
-            }
-        }
-    }
 }
 
 /* Sums the cells of each row from the left, blends, and clears the cells.  Whole pixels between two edges blend as a
@@ -154,29 +115,17 @@ static __attribute__((noinline)) void blend_cells_u8(blend_state *b, const cell_
 {
     TL_MIX_CALL(blend_cells, b->mode, b, c, 1)
 }
-static __attribute__((noinline)) void blend_met_cells_u8(blend_state *b, const cell_block *c)
-{
-    TL_MIX_CALL(blend_met_cells, b->mode, b, c, 1)
-}
 
 /* one copy for all modes: memory bandwidth is the limit */
 static __attribute__((noinline)) void blend_cells_f32(blend_state *b, const cell_block *c)
 {
     blend_cells(b, c, 0, b->mode);
 }
-static __attribute__((noinline)) void blend_met_cells_f32(blend_state *b, const cell_block *c)
-{
-    blend_met_cells(b, c, 0, b->mode);
-}
 
 static void blend_block(blend_state *b, const cell_block *c)
 {
-    if (b->canvas->is_u8 && c->met)
-        blend_met_cells_u8(b, c);
-    else if (b->canvas->is_u8)
+    if (b->canvas->is_u8)
         blend_cells_u8(b, c);
-    else if (c->met)
-        blend_met_cells_f32(b, c);
     else
         blend_cells_f32(b, c);
 }
@@ -228,9 +177,6 @@ static int strip_rows(int64_t n_cols)
     return (int)max64(rows, TL_STRIP_ROWS);
 }
 
-/* In strips of fewer columns reading all cells takes no longer than setting bits of the cells that edges meet. */
-#define TL_LOOKED_AT 128
-
 /* Blends the parts of n triangles, the pieces of one, in rows [row, row + n_rows) of the window. */
 static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, int64_t row, int n_rows)
 {
@@ -253,14 +199,8 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
     const tl_window strip = {
         window->x_px + col, window->y_px + row, (int64_t)right - col, n_rows, bits, TL_TEST_SAMPLE, NULL};
     area_plane plane;
-    uint64_t met[TL_MOST_MET / 64];
     fetch_pixels(b, row * b->stride + col, n_rows, min64(strip.width, 128));
     place_plane(&strip, &(tl_area){.cells = b->canvas->cells}, &plane);
-    const int64_t n_met = (int64_t)plane.stride * n_rows / TL_MET_CELLS;
-    if (strip.width >= TL_LOOKED_AT && n_met <= TL_MOST_MET) {
-        memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
-        plane.met = met;
-    }
     for (int64_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++) {
             const int next = k == 2 ? 0 : k + 1;
@@ -274,8 +214,6 @@ static void blend_strip(blend_state *b, const tl_triangle *pieces, int64_t n, in
                        .n_rows = n_rows,
                        .end = plane.n_cols,
                        .has_left = 1,
-                       .met = plane.met,
-                       .met_at = TL_CELL_PAD / TL_MET_CELLS,
                    });
     for (int64_t k = 0; k < n_rows; k++) /* clears cells right of the window */
         for (int64_t i = plane.n_cols / TL_LANES * TL_LANES; i < plane.stride - TL_CELL_PAD; i += TL_LANES)
