@@ -119,8 +119,6 @@ def of_threads(scene: Scene) -> Ways:
 
 #: Choices of yes or no: the function that decides, what it says with yes and with no, and the number of threads.
 SWITCHES: dict[str, tuple[str, str, str, int]] = {
-    "clip": ("must_cut", "searched", "left out", 1),  # cut triangles, where no vertex is outside of a plane
-    "divide": ("is_affine", "left out", "divided", 1),  # by w, where it is 1
     "depth test": ("pays_without_depth", "ids alone", "compared", 1),  # where every vertex lies at one depth
     "colours": ("is_direct", "as they come", "labels first", 1),
     "planes": ("can_slice", "bands", "a picture each", 1),  # samples of ids
@@ -136,8 +134,6 @@ def is_switched(choice: str, scene: Scene) -> bool:
     if choice == "planes":
         return verb in ("rasterize", "fill") and scene.sampling in MSAA
     asks = {
-        "clip": "transform" in scene.options and scene.kind != "clip-crossing",
-        "divide": scene.kind == "orthographic",
         "depth test": (scene.kind == "flat z" or len(scene.arrays[0]) == 3) and verb == "rasterize" and scene.has_depth,
         "colours": verb == "fill",
         "sorting": verb in ("rasterize", "overdraw"),
@@ -157,8 +153,6 @@ def of_switch(choice: str, scene: Scene) -> Ways:
 CHOICES: Mapping[str, Callable[[Scene], Ways]] = {
     "method": of_method,
     "arithmetic": of_arithmetic,
-    "clip": partial(of_switch, "clip"),
-    "divide": partial(of_switch, "divide"),
     "depth test": partial(of_switch, "depth test"),
     "colours": partial(of_switch, "colours"),
     "planes": partial(of_switch, "planes"),

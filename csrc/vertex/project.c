@@ -219,7 +219,7 @@ TL_INLINE vm store_points(double *out, vd x, vd y, vd z)
 /* `scalar` and the flags after it are constants: a copy for each keeps the matrix in registers. */
 TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t end, const tl_view *view,
                                 const tl_projected *out, tl_vertex_counts *counts, tl_scalar scalar, int has_matrix,
-                                int is_affine, int is_snapped)
+                                int is_snapped)
 {
     const double unit = is_snapped ? (double)(1 << view->subpixel_bits) : 1.0;
     const vd one = vd_set1(1.0), half = vd_set1(0.5), largest = vd_set1(FLT_MAX);
@@ -250,10 +250,7 @@ TL_INLINE int64_t project_lanes(const tl_source *source, int64_t first, int64_t 
                              scalar == TL_F32 ? vf_div(vf_set1(1.0f), vf_from_vd(p[3]))
                                               : vf_from_vd(vd_div(vd_set1(1.0), p[3])),
                              out->seen_rows + 4 * i);
-        if (is_affine)
-            ndc[0] = p[0], ndc[1] = p[1], ndc[2] = p[2];
-        else
-            vd_quotients(p, p[3], ndc, scalar == TL_F32);
+        vd_quotients(p, p[3], ndc, scalar == TL_F32);
         const vd x = vd_mul(vd_add(ndc[0], one), scale_x), y = vd_mul(vd_sub(one, ndc[1]), scale_y);
         const vd z = view->zero_to_one ? ndc[2] : vd_mul(vd_add(ndc[2], one), half);
         if (!(view->near_clip && view->far_clip))
@@ -277,13 +274,11 @@ TL_INLINE tl_vertex_counts project_all(const tl_source *source, int64_t first, i
     tl_vertex_counts counts = {0, 0, 0};
     int64_t i = first;
     if (TL_LANES > 1 && source->scalar == TL_F32)
-        i = source->is_affine ? project_lanes(source, first, end, view, out, &counts, TL_F32, 1, 1, is_snapped)
-            : source->matrix  ? project_lanes(source, first, end, view, out, &counts, TL_F32, 1, 0, is_snapped)
-                              : project_lanes(source, first, end, view, out, &counts, TL_F32, 0, 0, is_snapped);
+        i = source->matrix ? project_lanes(source, first, end, view, out, &counts, TL_F32, 1, is_snapped)
+                           : project_lanes(source, first, end, view, out, &counts, TL_F32, 0, is_snapped);
     else if (TL_LANES > 1)
-        i = source->is_affine ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 1, is_snapped)
-            : source->matrix  ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, 0, is_snapped)
-                              : project_lanes(source, first, end, view, out, &counts, TL_F64, 0, 0, is_snapped);
+        i = source->matrix ? project_lanes(source, first, end, view, out, &counts, TL_F64, 1, is_snapped)
+                           : project_lanes(source, first, end, view, out, &counts, TL_F64, 0, is_snapped);
     if (out->rows)
         set_inverse_w(source, out->rows, i, end, out->seen_rows);
     for (; i < end; i++)

@@ -98,16 +98,6 @@ def constantly(answer: Any) -> Callable[..., Any]:
     return lambda *_, **__: answer
 
 
-def is_affine(matrix: NDArray[Any] | None) -> bool:
-    """Tell whether every w is 1 behind a transform: dividing by it changes no bit, so it is left out."""
-    return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
-
-
-def must_cut(n_outside: int) -> bool:
-    """Tell whether to search for triangles that a clip plane cuts: no vertex outside, none cut."""
-    return n_outside > 0
-
-
 def threads_to_convert(threads: int | None, n_triangles: int) -> int:
     """Return how many threads make int32 of other indices."""
     return count_threads(threads, n_triangles) if pays_to_share(n_triangles) else 1

@@ -151,7 +151,12 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
 
 def source_of(points: NDArray[Any], view: View) -> engine.Source:
     """Return contiguous vertices with the matrix that the snap applies to each of them."""
-    return engine.Source(points, view.transform, choices.is_affine(view.transform))
+    return engine.Source(points, view.transform, is_affine(view.transform))
+
+
+def is_affine(matrix: NDArray[Any] | None) -> bool:
+    """Tell whether every w is 1 behind a transform, so that attributes are interpolated without 1/w."""
+    return matrix is not None and matrix[3].tolist() == [0, 0, 0, 1]
 
 
 def n_to_draw(given: MeshArrays, view: View) -> int:
@@ -170,7 +175,7 @@ def snap_input(memory: Memory, given: MeshArrays, view: View, *, with_depth: boo
     if n_bad:
         check_used_vertices(points, records, indices, view)
     pieces = None
-    if viewport is not None and choices.must_cut(n_clipped):
+    if viewport is not None and n_clipped:
         pieces = engine.Pieces(source, records, indices, viewport)
     view.mark("clip")
     if view.grid_bits > view.subpixel_bits:
@@ -234,7 +239,7 @@ def project_mesh(memory: Memory, given: MeshArrays, view: View, *, must_check: b
     if n_bad:
         check_projected(points, projected, indices)
     pieces = None
-    if choices.must_cut(n_clipped):
+    if n_clipped:
         pieces = engine.Pieces(source, projected, indices, viewport)
     view.mark("clip")
     return exact_mesh(given, projected, indices, pieces, view, viewport)

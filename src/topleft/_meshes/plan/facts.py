@@ -76,7 +76,6 @@ class Facts:
     n_components: int
     n_triangles: int
     is_clip_space: bool
-    is_affine: bool
     are_whole: bool  # vertices in pixels are whole numbers
     n_clipped: int  # vertices outside of a clip plane
     n_cut: int  # triangles that a plane cuts and that are drawn as pieces
@@ -187,7 +186,6 @@ def find_facts(
         n_components=points.shape[1],
         n_triangles=snapped.n_triangles,
         is_clip_space=source.is_clip_space,
-        is_affine=source.is_affine,
         are_whole=in_pixels and bool((points[:, :2] == np.rint(points[:, :2])).all()),
         n_clipped=int((is_special & (xy[:, 1] == 2)).sum()),
         n_cut=len(np.unique(pieces.arrays[5][: len(pieces)])) if pieces else 0,  # type: ignore[index]

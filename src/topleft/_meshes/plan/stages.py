@@ -128,11 +128,8 @@ def plan_input(facts: Facts) -> Stage:
 def plan_vertices(facts: Facts) -> Iterator[Stage]:
     """Describe transform, clip and snap: a pass over the vertices, and a pass over cut triangles."""
     view = facts.view
-    kind = "snap"
-    if facts.is_clip_space:
-        kind = "project" if view.transform is None else "affine" if facts.is_affine else "transform"
     threads = choices.threads_to_snap(view.threads, facts.n_vertices, facts.n_triangles)
-    if kind == "snap":
+    if not facts.is_clip_space:
         yield Stage("transform", "none", "vertices are in pixels", timed_in="snap")
         why = "pixels have no near or far plane, and sides never cut: all sums are exact"
         yield Stage("clip", "none", why, timed_in="snap")
@@ -140,7 +137,7 @@ def plan_vertices(facts: Facts) -> Iterator[Stage]:
         yield plan_transform(facts)
         yield plan_clip(facts)
     if view.is_exact:
-        is_taken = kind == "snap" and facts.point_dtype == "float64"
+        is_taken = not facts.is_clip_space and facts.point_dtype == "float64"
         why = f"{vertices(facts.n_vertices)} stay where they are: no pixel is wrong against the numbers of the array"
         choice = "none, float64 where it lies" if is_taken else f"none, float64, {plural(threads, 'thread')}"
         grid = ("a grid: vertices would move by up to 1/512 px at 8 sub-pixel bits",)
@@ -160,15 +157,11 @@ def plan_transform(facts: Facts) -> Stage:
     precision = facts.point_dtype
     if facts.view.transform is None:
         return Stage("transform", f"divide by w in {precision}", "vertices are in clip space", timed_in="snap")
-    if facts.is_affine:
-        rejected = (f"a divide by w for each of {vertices(facts.n_vertices)}: by 1 it changes no bit",)
-        choice = f"matrix in {precision}, no divide"
-        return Stage("transform", choice, "its last row is 0 0 0 1, so every w is 1", rejected, timed_in="snap")
     other = "float64: the vertices are float32"
     if precision == "float64":
         other = "float32: would round away bits that the vertices have"
-    choice, why = f"matrix and divide by w in {precision}", "perspective: the last row of the matrix is not 0 0 0 1"
-    return Stage("transform", choice, why, (other,), timed_in="snap")
+    choice = f"matrix and divide by w in {precision}"
+    return Stage("transform", choice, "vertices are in object space", (other,), timed_in="snap")
 
 
 def plan_clip(facts: Facts) -> Stage:
