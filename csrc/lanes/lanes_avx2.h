@@ -75,8 +75,9 @@ TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
         return _mm256_setzero_si256();
     int32_t k[8];
     vi_store(k, _mm256_and_si256(m, i));
-    return _mm256_and_si256(m,
-                            _mm256_setr_epi32(p[k[0]], p[k[1]], p[k[2]], p[k[3]], p[k[4]], p[k[5]], p[k[6]], p[k[7]]));
+    return _mm256_and_si256(m, _mm256_setr_epi32(int32_at(p, k[0]), int32_at(p, k[1]), int32_at(p, k[2]),
+                                                 int32_at(p, k[3]), int32_at(p, k[4]), int32_at(p, k[5]),
+                                                 int32_at(p, k[6]), int32_at(p, k[7])));
 }
 
 TL_INLINE vm vm_and(vm a, vm b) { return _mm256_and_si256(a, b); }

@@ -118,7 +118,7 @@ TL_INLINE vi vi_prefix_sum(vi a) { return a; }
 TL_INLINE vi vi_last(vi a) { return a; }
 TL_INLINE vi vi_shift_in(vi a, vi before) { return (void)a, before; }
 TL_INLINE vf vf_from_unsigned(vi a) { return (float)(uint32_t)a; }
-TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return m ? p[i] : 0; }
+TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i) { return m ? int32_at(p, i) : 0; }
 
 TL_INLINE vm vm_and(vm a, vm b) { return a & b; }
 TL_INLINE vm vm_or(vm a, vm b) { return a | b; }

@@ -321,7 +321,7 @@ TL_INLINE vi vi_gather(vm m, const int32_t *p, vi i)
     int32_t a[4] = {0, 0, 0, 0};
     for (int k = 0; k < 4; k++)
         if (bits >> k & 1)
-            a[k] = p[i[k]];
+            a[k] = int32_at(p, i[k]);
     return (vi){a[0], a[1], a[2], a[3]};
 }
 static const uint8_t compress_order[16][16] __attribute__((aligned(16))) = {
