@@ -64,8 +64,11 @@ FLAGS_CYTHON = [
 FLAGS_UNIT = ["-Wno-unused-function"]
 # The classics do their arithmetic in the unit that Cython makes, from their headers.
 FLAGS_CLASSIC = [*FLAGS_CYTHON, "-O3", "-fno-math-errno"]
-# For findings of a sanitizer: where they are, and integers whose overflow the language does not define.
-FLAGS_SANITIZED = ["-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"]
+# For findings of a sanitizer: where they are, and integers whose overflow the language does not define. Pointers are
+# checked by AddressSanitizer where memory is accessed: without three checks of UBSan a unit takes 0.6 of the time.
+FLAGS_SANITIZED = [
+    "-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv", "-fno-sanitize=null,object-size,pointer-overflow",
+]  # fmt: skip
 # gcc 12 moves halves of vectors through a register of MMX, and leaves the floating point of x87 in ruins.
 FLAGS_SSE41 = ["-msse4.1", "-mpopcnt", "-mno-mmx"]
 FLAGS_AVX2 = ["-mavx2", "-mfma", "-mbmi", "-mbmi2", "-mlzcnt", "-mpopcnt"]
