@@ -22,7 +22,7 @@ cdef const void *first_of(array: object):
 
 
 cdef tl_grad_texture looked_up(levels: list[Array], codes: tuple[int, int], arrays: tuple[Array | None, ...]):
-    """Return a texture and its coordinates; the parameters are those of `GradientView.texels`."""
+    """Return `tl_grad_texture` of the parameters of `GradientView.texels`."""
     cdef tl_grad_texture t
     cdef int64_t n_texels = 0
     cdef int k

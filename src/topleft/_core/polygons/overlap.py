@@ -29,7 +29,7 @@ from topleft._core.polygons.rings import as_points, rings_of_triangles
 from topleft.errors import MissingPackageError
 from topleft.typing import RuleOption
 
-#: Entries allocated at a time, at least those of a polygon; pages that are not written cost nothing.
+#: Entries allocated at a time, or as many as the largest polygon needs; pages that are not written cost nothing.
 MAX_ENTRIES_AT_ONCE = 1 << 27
 
 #: Entries that a thread lists before it copies them to the table: they stay in the second-level cache.

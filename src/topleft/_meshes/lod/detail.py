@@ -122,7 +122,7 @@ def choose_detail(
     ValueError
         If the tolerance is negative or not finite.
     MissingPackageError
-        If levels are to be made and fast-simplification is not installed.
+        If levels must be computed and fast-simplification is not installed.
 
     Notes
     -----

@@ -154,7 +154,7 @@ def find_facts(
     caller_view, view = view, replace(view, is_exact=False)  # the census counts snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.given.check_indices()
-    given, indices = as_array("vertices", vertices), as_array("triangles", triangles)
+    caller_vertices, indices = as_array("vertices", vertices), as_array("triangles", triangles)
     (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
@@ -178,9 +178,9 @@ def find_facts(
         test=test,
         route=route,
         drawing=drawing,
-        vertex_dtype=str(given.dtype),
+        vertex_dtype=str(caller_vertices.dtype),
         point_dtype=str(points.dtype),
-        is_vertex_copy=not np.shares_memory(given, points),
+        is_vertex_copy=not np.shares_memory(caller_vertices, points),
         index_dtype=str(indices.dtype),
         n_vertices=len(points),
         n_components=points.shape[1],
