@@ -43,6 +43,7 @@ POLYGONS = FLAT[0], np.arange(0, 300_001, 3), np.arange(100_001)
 BALL = tl.Mesh(*tl.scenes.shape("icosphere"))
 VIEWER = tl.Camera.look_at((0, 0, 1.2), (0, 0, 0))
 BALL_FRAGS = tl.rasterize_mesh(BALL, VIEWER, (3000, 3000))
+SHEET = tl.Mesh(np.eye(3), [[0, 1, 2]], uv=[[0, 0], [1, 0], [0, 1]])
 BUFFER = tl.rasterize(LARGE[0], LARGE[1][:100], SIZE)
 LIGHTS = [tl.Light((x, 1, 3), kind="point", space="eye") for x in range(400)]
 
@@ -83,6 +84,9 @@ DRAWS = {
     "table of triangles": lambda n: tl.overlap(FLAT[0], SIZE, triangles=FLAT[1], threads=n),
     "tiles": lambda n: list(tl.tiles(FLAT, SIZE, kind="overdraw", sampling="area", window=500, threads=n)),
     "merge": lambda n: tl.merge([BUFFER] * 3000, threads=n),
+    "viewshed": lambda n: tl.viewshed(np.zeros((2000, 2000)), (1000.5, 1000.5), eye_height=2.0, threads=n),
+    "gradients of areas": lambda n: tl.area_vjp(*FLAT, SIZE, np.ones(SIZE), threads=n),
+    "bake from a source": lambda n: tl.bake(SHEET, "position", 2000, source=BALL, threads=n),
     "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 

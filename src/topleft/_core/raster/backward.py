@@ -325,7 +325,10 @@ def area_vjp(
         values = None if of_triangles is None else of_triangles[first:end]
         engine.area_vjp(corners_px[part], own, values, of_pixels, g_corners[part])
 
-    run_parts(work, len(rows), threads_of_rows(len(rows), parse_threads(threads)))
+    n_threads = threads_of_rows(len(rows), parse_threads(threads))
+    # parts of at most 2**20 steps from pixel to pixel, or a triangle, for Ctrl-C is heard between parts alone
+    n_steps = 3 * len(rows) * (width + height) * of_pixels.shape[2]
+    run_parts(work, len(rows), max(n_threads, n_steps >> 20), n_threads)
     out = np.zeros(points_px.shape)
     for axis in range(2):
         out[:, axis] = np.bincount(rows.ravel(), g_corners[:, axis], len(points))

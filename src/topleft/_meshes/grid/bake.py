@@ -276,7 +276,12 @@ def from_source(chart: Chart, source: Mesh, what: object, max_distance: float | 
     nearest, feet = np.empty(len(at), np.int32), np.empty((len(at), 3))
     points -= center
     engine_tree = tree.tree  # built before threads use it
-    run_parts(lambda first, end: engine_tree.find_nearest(points, first, end, nearest, feet), len(at), chart.n_threads)
+
+    def find(first: int, end: int) -> None:
+        engine_tree.find_nearest(points, first, end, nearest, feet)
+
+    # parts of at most 2**14 texels, for Ctrl-C is heard between parts alone
+    run_parts(find, len(at), max(chart.n_threads, len(at) >> 14), chart.n_threads)
     is_near = np.ones(len(at), np.bool_)
     if max_distance is not None:
         is_near = np.einsum("ij,ij->i", feet - points, feet - points) <= max_distance * max_distance

@@ -151,8 +151,8 @@ def viewshed(
     def view_rows(first: int, end: int) -> None:
         engine.view_heights(heights, blocks, place, columns, rows, cell, falls, most * most, first, end, above)
 
-    n_threads = threads_for(threads, heights.size)
-    run_parts(view_rows, len(heights), n_threads)
+    # a part for each row, for Ctrl-C is heard between parts alone
+    run_parts(view_rows, len(heights), len(heights), threads_for(threads, heights.size))
     with np.errstate(invalid="ignore"):
         return Viewshed(above <= target_height, above, cells)
 
