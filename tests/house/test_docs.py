@@ -99,3 +99,14 @@ def test_limits_of_files_are_those_of_the_page():
         name: (8 << 30 if "G" in least else int(least.replace(",", "")), float(more or 0)) for name, least, more in rows
     }
     assert said == {name: (limit.least, limit.per_byte) for name, limit in LIMITS.items()}
+
+
+def test_each_room_has_a_promise_in_trust():
+    page = (DOCS / "guide/trust.md").read_text(encoding="utf-8")
+    rows = [row.split("|")[2:5] for row in re.findall(r"^\|.*\|$", page, re.M) if row.count("|") == 5][2:]
+    python, c, tests = ({name for row in rows for name in re.findall(r"`([^`]+)`", row[k])} for k in range(3))
+    package = ROOT / "src/topleft"
+    rooms = {path.relative_to(package).as_posix() for path in package.glob("[_m]*/*/") if any(path.glob("*.py"))}
+    assert python == rooms | {"_torch", "compat"}
+    assert c == {path.name for path in (ROOT / "csrc").iterdir() if path.is_dir()}
+    assert all((ROOT / name).exists() for name in tests)
