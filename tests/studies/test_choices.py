@@ -111,8 +111,8 @@ def test_chart_has_a_row_for_each_choice(record, tmp_path):
 def test_command_measures_and_adds_to_its_file(tmp_path, capsys):
     out = tmp_path / "choices.json"
     tiny = ["--repeats", "1", "--scale", "0.02", "-o", str(out)]
-    for choice in ("divide", "clip"):
+    for choice in ("method", "sorting"):
         assert cli.main(["choices", "--choice", choice, "--scene", "orthographic 10k", *tiny]) == 0
-    assert {row["choice"] for row in json.loads(out.read_text())["rows"]} == {"divide", "clip"}
+    assert {row["choice"] for row in json.loads(out.read_text())["rows"]} == {"method", "sorting"}
     assert cli.main(["choices", "--choice", "none such", *tiny]) == 2
     assert "--choice must be some of method" in capsys.readouterr().err

@@ -115,7 +115,7 @@ cdef class GradientView:
                int64_t end):
         """Write rows of a texture, levels (., H, W, C).
 
-        `codes`: `tl_texel_filter` and `tl_texel_edge` of ``csrc/grad.h``. `arrays`: uv, uv_da, bias, out; None where an
+        `codes`: `tl_texel_filter` and `tl_texel_edge` of ``csrc/grad/grad.h``. `arrays`: uv, uv_da, bias, out; None where an
         array is absent.
         """
         cdef tl_grad_view view = self.rows(first, end)

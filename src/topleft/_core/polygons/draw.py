@@ -27,7 +27,7 @@ MAX_BITS = 1 << 30
 MAX_CELLS = 1 << 24
 MAX_LISTED_CROSSINGS = 1 << 22
 
-TESTS = {"center": 0, "outer": 1, "inner": 2}  # tl_polygon_test in csrc/polygons.h
+TESTS = {"center": 0, "outer": 1, "inner": 2}  # tl_polygon_test in csrc/polygons/polygons.h
 
 
 def draw_mask(

@@ -20,7 +20,7 @@ from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.raster.fragments import Fragments
 from topleft.typing import DepthTestOption
 
-RULES = {"less": 0, "greater": 1, None: 2}  # tl_merge_rule in csrc/tiles.h
+RULES = {"less": 0, "greater": 1, None: 2}  # tl_merge_rule in csrc/tiles/tiles.h
 
 #: Pixels a thread; below that starting it costs more than it saves.
 MIN_PIXELS_PER_THREAD = 1 << 18

@@ -48,7 +48,7 @@ class ClusterFacts:
 
 
 class Decided(NamedTuple):
-    """How samples of triangles whose vertices are not snapped were decided: `tl_exact_counts` in ``csrc/exact.h``."""
+    """How samples of triangles that are not snapped were decided: `tl_exact_counts` in ``csrc/vertex/exact.h``."""
 
     n_triangles: int
     n_on_grid: int
