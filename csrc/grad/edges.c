@@ -210,7 +210,7 @@ TL_INLINE int next_meeting(pair_scan *s, int is_f64)
     if (is_within && s->begins) {
         const int64_t *runs = s->row_runs + row - s->lowest;
         s->columns = s->begins + runs[0] + 1, s->n_columns = runs[1] - runs[0] - 1;
-        s->ids = s->shown + s->step * row - 1, s->others = s->ids + 1;
+        s->ids = s->shown + s->step * row, s->others = s->ids + 1;
         return 1;
     }
     s->others = s->shown ? s->shown + s->step * row : own;
@@ -225,8 +225,10 @@ TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
 {
     const tl_grad_edges *e = s->edges;
     const vi none = vi_set1(-1), end = vi_set1(clamped_to_int(s->view->n_triangles));
+    const int in_column = s->meeting % 2 == 0;
     const vm are_left = vm_first(s->n_columns - s->n_taken);
-    const vi x = vi_load(s->columns + s->n_taken);
+    /* a run begins at the second pixel of a pair */
+    const vi x = vi_sub(vi_load(s->columns + s->n_taken), vi_set1(s->begins && !in_column));
     const vi id = vi_max(vi_gather(are_left, s->ids, x), none), other = vi_max(vi_gather(are_left, s->others, x), none);
     vm m = vm_and(are_left, vm_and(vi_gt(end, id), vi_gt(end, other)));
     m = vm_and_not(m, vi_eq(id, other));
@@ -236,10 +238,9 @@ TL_INLINE void list_some(pair_scan *s, tl_pair_list *list)
         m = vm_and(m, vi_gt(outlines, none)); /* both have corners */
         m = vm_and_not(m, runs_on(e, m, id, other, outlines));
     }
-    const int in_column = s->meeting % 2 == 0;
     const int64_t row = s->meeting / 2 - in_column;
     vi_compress(list->near + list->n, m, id), vi_compress(list->far + list->n, m, other);
-    vi_compress(list->column + list->n, m, vi_sub(x, vi_set1(s->begins && !in_column)));
+    vi_compress(list->column + list->n, m, x);
     list->n +=
         vi_compress(list->where + list->n, m, vi_set1((int32_t)(row << TL_ROW_SHIFT) + in_column * TL_IN_COLUMN));
     s->n_taken += TL_LANES;
