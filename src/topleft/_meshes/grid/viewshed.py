@@ -111,7 +111,9 @@ def viewshed(
     -----
     The line of sight to the middle of a cell is tested wherever it crosses a line between the middles of neighbouring
     cells, along rows and along columns, where the ground is between their heights. So only the inside of a square of
-    four middles lies between two tests. The time grows with the cells times the sides of the grid.
+    four middles lies between two tests. The time grows with the cells times the sides of the grid: flat ground, where
+    nothing can be skipped, is the worst, 4.7 s of a core of a Zen 3 for 1000 x 1000 cells, so a quarter of an hour for
+    6000 x 6000.
 
     Examples
     --------
