@@ -174,7 +174,7 @@ def test_rast_is_copied_and_saved_as_any_tensor():
 @pytest.mark.parametrize("other", [2**31 - 1, -(2**31), 10**9])
 def test_what_lies_across_edges_may_change_once_the_outline_is_known(isa, rule, other):
     pos, tri, colours = (one.numpy() for one in sphere(level=2))
-    grid, ids = PixelGrid(tri, 1, 40, 50), tl.rasterize(pos, tri, (50, 40)).triangle
+    grid, ids = PixelGrid(tri, 1, 40, 50), [tl.rasterize(pos[0], tri, (50, 40)).triangle]
     rast, _ = tensors.points(grid, pos, [(one, 0) for one in ids], is_flipped=True, with_db=False)
     color, _ = tensors.values(grid, colours[None], rast)
     outline = tensors.outline_of(grid, pos, tensors.halves_across(tri))
