@@ -114,6 +114,7 @@ def test_obj_broken_is_refused(load, text, message):
         ("p 1\n", "points not drawn"),
         ("usemtl red\n", "materials without a library: 'red'"),
         ("mtllib gone.mtl\nusemtl m\n", "material libraries not found: 'gone.mtl'"),
+        ("mtllib a.obj\nusemtl m\n", "materials not in its libraries: 'm'"),
         ("mtllib ../a.mtl\nusemtl m\n", "material libraries outside of its folder not read: '../a.mtl'"),
         ("f 1/9 2/9 3/9\n", "texture coordinates that faces name and that are not there"),
     ],
@@ -122,6 +123,13 @@ def test_obj_what_is_missing_is_told(tmp_path, text, message):
     (tmp_path / "a.obj").write_text(SQUARE + text + "f 1 2 3\n")
     with pytest.warns(MeshWarning, match=message):
         tl.load(tmp_path / "a.obj")
+
+
+def test_obj_vertices_without_a_colour_beside_others_are_white(load):
+    mesh = load("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1 0.2\nv 0 2 0 1\nf 1 2 3\nf 1 2 4\n")
+    colors = {tuple(at): tuple(color) for at, color in zip(mesh.vertices[:, :2], mesh.colors, strict=True)}
+    white = (255, 255, 255, 255)
+    assert colors == {(0, 0): (255, 0, 0, 255), (1, 0): white, (0, 1): (0, 0, 255, 51), (0, 2): white}
 
 
 # MTL
@@ -167,6 +175,22 @@ def test_mtl_map_options_place_the_texture(load, tmp_path):
     assert material.texture.transform.tolist() == [[2, 0, 0.5], [0, 3, 0]]
     assert material.texture.wrap == ("clamp", "clamp")
     assert material.color is None
+
+
+@pytest.mark.parametrize("name", ["a.png", "a b.png", "a -s 2.png"])
+@pytest.mark.parametrize("behind", ["-s 2 3 -clamp on", "-clamp on  -s 2 3 1 -mm 0.0 1.0 -cc off"])
+def test_mtl_map_options_may_stand_behind_the_name(load, tmp_path, name, behind):
+    picture(tmp_path, name, np.zeros((2, 2, 3)))
+    texture = material_of(load, f"map_Kd {name} {behind}\n").texture
+    assert (texture.transform.tolist(), texture.wrap) == ([[2, 0, 0], [0, 3, 0]], ("clamp", "clamp"))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
+def test_mtl_is_read_in_every_encoding(tmp_path, encoding):
+    mark = "\ufeff" if encoding[-3:] in ("-le", "-be") else ""
+    (tmp_path / "a.mtl").write_text(mark + "newmtl grün\nKd 1 0 0\n", encoding=encoding)
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n" + SQUARE + "usemtl grün\nf 1 2 3\n", encoding="utf-8")
+    assert tl.load(tmp_path / "a.obj").materials[0].color == (255, 0, 0)
 
 
 def test_mtl_alpha_of_a_colour_map_is_not_opacity_but_map_d_is(load, tmp_path):
@@ -219,6 +243,9 @@ def test_mtl_metallic_rough_maps_become_one(load, tmp_path):
         ("map_Kd a.mtl\n", "textures that cannot be read: 'a.mtl'"),
         ("map_Ks a.png\n", "map_Ks of its materials not read"),
         ("map_Ka a.png\n", "map_Ka of its materials not read"),
+        ("map_rma a.png\n", "map_rma of its materials not read"),
+        ("map_Kd -mm 0.1 2\n", "options of maps not read: '-mm'"),
+        ("Kd 1 0 0\nnewmtl m\nKd 0 1 0\n", "materials defined again, of which the last is drawn: 'm'"),
         ("d 0\n", "materials that are wholly transparent"),
     ],
 )
@@ -260,7 +287,8 @@ def test_mtl_texture_of_faces_without_coordinates_beside_others_is_told(tmp_path
 
 def test_mtl_paths_of_other_machines_are_found_by_name(load, tmp_path):
     picture(tmp_path, "a.png", np.zeros((1, 1, 3)))
-    for name in (r"C:\users\me\a.png", "/home/me/a.png", "../x/A.PNG", "./a.png"):
+    urls = "file:///C:/x/a.png", "FILE://localhost/x/%61.png", "file:a.png", "https://a.example/x/a.png"
+    for name in (r"C:\users\me\a.png", "/home/me/a.png", "../x/A.PNG", "./a.png", *urls):
         assert material_of(load, f"map_Kd {name}\n").texture is not None
 
 

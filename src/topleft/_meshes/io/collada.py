@@ -324,7 +324,8 @@ class _Collada:
         if not path.strip():
             self._notes.add("images without a file", name)
             return None
-        return self._source.picture(unquote(path.strip()).removeprefix("file://"))
+        path = path.strip()
+        return self._source.picture(path if path[:5].lower() == "file:" else unquote(path))
 
     def _texture(self, picture: U8 | None) -> Texture | None:
         if picture is None:

@@ -31,7 +31,7 @@ OPTION_LENGTHS = {
 }  # fmt: skip
 """The most words that an option of a map has."""
 
-UNREAD_MAPS = ("map_Ks", "map_Ns", "disp", "decal", "refl", "map_disp", "map_refl", "map_Ps", "map_aniso")
+UNREAD_MAPS = ("disp", "decal", "refl")
 NEARLY_OPAQUE, NEARLY_CLEAR = 250, 5
 """A map of opacity whose values all lie above or below is a cutout."""
 
@@ -77,12 +77,14 @@ def read_mtl(text: str, folder: Path, source: InputFile) -> dict[str, Callable[[
             continue
         key, rest = words[0], words[1].strip() if len(words) > 1 else ""
         if key == "newmtl":
+            if rest in entries:
+                source.notes.add("materials defined again, of which the last is drawn", rest)
             own = entries[rest] = _Entry()
-        elif key == "map_Ka":
+        elif key.lower() == "map_ka":
             own.has_ambient_map = True
         elif key.lower() in MAPS:
-            own.maps[MAPS[key.lower()]] = _map_of(rest)
-        elif key in UNREAD_MAPS:
+            own.maps[MAPS[key.lower()]] = _map_of(rest, source)
+        elif key.lower().startswith("map_") or key in UNREAD_MAPS:
             source.notes.add(f"{key} of its materials not read")
         elif key in ("Kd", "Ks", "Ke", "Ns", "d", "Tr", "illum", "Pr", "Pm"):
             own.numbers[key] = _numbers(rest, key)
@@ -116,26 +118,23 @@ def _numbers(rest: str, key: str) -> list[float]:
     return values
 
 
-def _map_of(rest: str) -> _Map:
-    """A picture with its options, which stand before its name."""
-    own, words = _Map(""), rest.split(" ")
+def _map_of(rest: str, source: InputFile) -> _Map:
+    """A picture with its options, which stand before its name, or behind the suffix of it."""
+    own, words, name = _Map(""), rest.split(" "), list[str]()
     i = 0
     while i < len(words):
         option = words[i]
-        if not option:
+        i += 1
+        if option not in OPTION_LENGTHS or (name and "." not in "".join(name)):
+            name += [option] if option or name else []
+            continue
+        values: list[str] = []
+        while i < len(words) and len(values) < OPTION_LENGTHS[option] and (not values or _is_number(words[i])):
+            if words[i]:
+                values.append(words[i])
             i += 1
-        elif option in OPTION_LENGTHS:
-            j = i + 1
-            values: list[str] = []
-            while j < len(words) and len(values) < OPTION_LENGTHS[option] and (not values or _is_number(words[j])):
-                if words[j]:
-                    values.append(words[j])
-                j += 1
-            _set_option(own, option, values)
-            i = j
-        else:
-            break
-    own.name = " ".join(words[i:]).strip().strip('"')
+        _set_option(own, option, values, source)
+    own.name = " ".join(name).strip().strip('"')
     return own
 
 
@@ -146,7 +145,7 @@ def _is_number(word: str) -> bool:
         return False
 
 
-def _set_option(own: _Map, option: str, values: list[str]) -> None:
+def _set_option(own: _Map, option: str, values: list[str], source: InputFile) -> None:
     numbers = [float(value) for value in values if value and _is_number(value)]
     match option:
         case "-s" if numbers:
@@ -159,6 +158,8 @@ def _set_option(own: _Map, option: str, values: list[str]) -> None:
             own.bump = numbers[0]
         case "-imfchan" if values:
             own.channel = values[0]
+        case "-t" | "-mm" | "-cc" if values == ["on"] or (any(numbers) and numbers != [0, 1]):
+            source.notes.add("options of maps not read", option)
 
 
 class _Makers:

@@ -15,7 +15,7 @@ import numpy as np
 
 from topleft._core.base.array_types import F64, I64, U8
 from topleft._meshes.io.mtl import read_mtl
-from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text
+from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, utf8_of
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.polygons import triangulate
@@ -129,9 +129,7 @@ class _Text:
     """
 
     def __init__(self, content: bytes) -> None:
-        if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            content = content.decode("utf-16", errors="replace").encode()
-        content = content.removeprefix(b"\xef\xbb\xbf")
+        content = utf8_of(content)
         if b"\0" in content:
             raise MeshError("it is not text")
         if b"\\" in content:
@@ -237,18 +235,19 @@ def _columns(numbers: F64, n_of_line: I64, n: int) -> F64:
 
 
 def _positions(numbers: F64, n_of_line: I64) -> tuple[F64, U8 | None]:
-    """Positions (V, 3), and the colours (V, 4) that follow them where each has a colour."""
+    """Positions (V, 3), and the colours (V, 4) that follow them; white where others have a colour."""
     if len(n_of_line) and int(n_of_line.min()) < 3:
         row = int((n_of_line < 3).argmax())
         raise MeshError(f"its vertex {row + 1} has {n_of_line[row]} of 3 numbers")
     positions = np.ascontiguousarray(_columns(numbers, n_of_line, 3))
-    if not len(n_of_line) or int(n_of_line.min()) < 6:
+    if int(n_of_line.max(initial=0)) < 6:
         return positions, None
-    values = _columns(numbers, n_of_line, 7 if int(n_of_line.min()) >= 7 else 6)[:, 3:]
+    values = _columns(numbers, n_of_line, 7)[:, 3:]
+    values[n_of_line < 6] = 0
     with np.errstate(invalid="ignore"):
         bytes_ = np.nan_to_num(values * (255 if values.max() <= 1 else 1)).clip(0, 255)
-    alpha = bytes_[:, 3:] if values.shape[1] == 4 else np.full((len(values), 1), 255.0)
-    return positions, np.rint(np.column_stack([bytes_[:, :3], alpha])).astype(np.uint8)
+    bytes_[n_of_line < 6], bytes_[n_of_line < 7, 3] = 255, 255
+    return positions, np.rint(bytes_).astype(np.uint8)
 
 
 def _faces(text: _Text, n_above_all: tuple[int, int, int], source: InputFile) -> tuple[I64, I64]:
@@ -344,8 +343,9 @@ def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I6
     names = list(rows)
     use_of_face = np.array(rows_of_use)[at]
     if not any(name in known for name in names):
-        if len(text.lines_of(b"mtllib")) == 0:
-            source.notes.add("materials without a library", names[0])
+        where = "not in its libraries" if text.lines_of(b"mtllib").size else "without a library"
+        for name in names:
+            source.notes.add(f"materials {where}", name)
         return (), None
     materials: list[Material] = []
     place = np.zeros(len(names) + 1, np.int64)
@@ -378,5 +378,5 @@ def _library(text: _Text, source: InputFile) -> dict[str, Callable[[], Material]
             if path.resolve() not in read:
                 read.add(path.resolve())
                 content = source.read_at(path, name, "material libraries") or b""
-                known |= read_mtl(content.decode("utf-8", errors="replace"), path.parent, source)
+                known |= read_mtl(utf8_of(content).decode("utf-8", errors="replace"), path.parent, source)
     return known

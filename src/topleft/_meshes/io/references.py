@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
@@ -123,6 +124,8 @@ class InputFile:
 
     def _looked_for(self, name: str, what: str, folder: Path) -> Path | None:
         home = self._home
+        if name[:5].lower() == "file:":
+            name = unquote(name[5:].removeprefix("//").removeprefix("localhost"))
         leads_elsewhere = "\0" in name or re.match(r"/|[A-Za-z][A-Za-z0-9+.-]*:", name) is not None
         try:
             if not leads_elsewhere:
@@ -130,7 +133,7 @@ class InputFile:
                 if found is not None and found.resolve().is_relative_to(home):
                     return found
                 leads_elsewhere = not (folder / name).resolve().is_relative_to(home) or found is not None
-            if leads_elsewhere and not re.match(r"[A-Za-z][A-Za-z0-9+.-]+:", name):
+            if leads_elsewhere:
                 found = self._as_spelled(folder / name.rpartition("/")[2].replace("\0", ""))
                 if found is not None and found.resolve().is_relative_to(home):
                     return found
@@ -195,6 +198,13 @@ class InputFile:
         except Exception:  # broken bytes end in whatever the decoder meets: OSError, SyntaxError, struct.error, ...
             self.notes.add("textures that cannot be read", name)
         return None
+
+
+def utf8_of(content: bytes) -> bytes:
+    """A text in UTF-8, or with a byte order mark in UTF-16, as UTF-8 without a mark."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        content = content.decode("utf-16", errors="replace").encode()
+    return content.removeprefix(b"\xef\xbb\xbf")
 
 
 def numbers_of_text(content: bytes, dtype: Any = np.float64) -> npt.NDArray[Any]:
