@@ -1,7 +1,7 @@
 """Compiles the kernels to WebAssembly, for the page that `topleft explore --export` writes.
 
-`python packaging/wasm.py`. In: `src/topleft/_apps/explore/wasm`, `csrc` and the classics. Out: `topleft-simd128.wasm`
-and `topleft-scalar.wasm` in the page's folder, which wheels and the sdist take from there; git does not keep them.
+`python packaging/wasm.py`. In: `src/topleft/_apps/explore/wasm`, `csrc` and the classics. Out: `topleft.wasm` in the
+page's folder, which wheels and the sdist take from there; git does not keep it. Browsers have its vectors since 2023.
 
 Needs a clang with the target wasm32-wasi, lld and wasi-libc: on Debian `apt-get install clang lld wasi-libc
 libclang-rt-dev-wasm32`. TOPLEFT_WASM_CC names another clang, with its flags; that of a WASI SDK finds its libraries.
@@ -15,7 +15,6 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,10 +24,9 @@ PAGE = ROOT / "src/topleft/_apps/explore/page"
 COMPILER = "clang --target=wasm32-wasi --sysroot=/usr"
 FLAGS = [
     "-std=c11", "-O3", "-DNDEBUG", f"-I{ROOT / 'csrc'}", f"-I{CLASSICS}", "-ffp-contract=off", "-fno-fast-math",
-    "-fno-math-errno", "-fvisibility=hidden", "-Wall", "-Wextra", "-Werror",
+    "-fno-math-errno", "-fvisibility=hidden", "-msimd128", "-Wall", "-Wextra", "-Werror",
 ]  # fmt: skip
 LINKED = ["-nostartfiles", "-Wl,--no-entry", "-Wl,--gc-sections", "-Wl,-s", "-Wl,-z,stack-size=1048576"]
-SETS = {"simd128": ["-msimd128"], "scalar": []}
 
 
 def compiler() -> list[str]:
@@ -49,9 +47,9 @@ def why_not() -> str:
         return done.stderr.strip()[:300] if done.returncode else ""
 
 
-def build(name: str) -> Path:
-    """Compile one set, unless it stands there made of the same sources."""
-    out, stamp = PAGE / f"topleft-{name}.wasm", ROOT / "build" / f"topleft-{name}.wasm.key"
+def build() -> Path:
+    """Compile the module, unless one made of the same sources stands there."""
+    out, stamp = PAGE / "topleft.wasm", ROOT / "build" / "topleft.wasm.key"
     sources = [*sorted((ROOT / "csrc").rglob("*.[ch]")), *sorted(CLASSICS.glob("*.h")), *UNITS, Path(__file__)]
     key = hashlib.sha256(b"\0".join([repr(compiler()).encode(), *(path.read_bytes() for path in sources)])).hexdigest()
     if out.exists() and stamp.exists() and stamp.read_text() == key:
@@ -60,7 +58,7 @@ def build(name: str) -> Path:
         made, objects = Path(folder, out.name), [Path(folder, unit.stem + ".o") for unit in UNITS]
         # Two steps: with -O a clang that links calls Binaryen's wasm-opt where it finds one, and old ones know no SIMD.
         for unit, object_ in zip(UNITS, objects, strict=True):
-            subprocess.run([*compiler(), *FLAGS, *SETS[name], "-c", str(unit), "-o", str(object_)], check=True)
+            subprocess.run([*compiler(), *FLAGS, "-c", str(unit), "-o", str(object_)], check=True)
         subprocess.run([*compiler(), *LINKED, *map(str, objects), "-lm", "-o", str(made)], check=True)
         out.write_bytes(made.read_bytes())
     stamp.parent.mkdir(exist_ok=True)
@@ -69,13 +67,12 @@ def build(name: str) -> Path:
 
 
 def main() -> int:
-    """Build all sets; 1 where no compiler can."""
+    """Build the module; 1 where no compiler can."""
     if told := why_not():
         sys.stderr.write(f"no WebAssembly: {told}\n")
         return 1
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for path in pool.map(build, SETS):
-            sys.stdout.write(f"{path.relative_to(ROOT)}: {path.stat().st_size} bytes\n")
+    path = build()
+    sys.stdout.write(f"{path.relative_to(ROOT)}: {path.stat().st_size} bytes\n")
     return 0
 
 

@@ -9,14 +9,13 @@ from node_page import NODE, PAGE, NodePage
 
 from topleft._apps.explore.content import SCENES, content_of_name, scene
 from topleft._apps.explore.session import Content
-from topleft._apps.explore.static import N_SEEDS, SETS, write_static
+from topleft._apps.explore.static import MODULE, N_SEEDS, write_static
 from topleft.methods import CLASSICS, METHODS
 from topleft.scene_families import FAMILIES
 from topleft.typing import SamplingOption
 
-HAS_KERNELS = all(PAGE.joinpath(f"topleft-{name}.wasm").is_file() for name in SETS)
 pytestmark = [
-    pytest.mark.skipif(not HAS_KERNELS, reason="no kernels for WebAssembly: python packaging/wasm.py"),
+    pytest.mark.skipif(not PAGE.joinpath(MODULE).is_file(), reason="no topleft.wasm: python packaging/wasm.py"),
     pytest.mark.skipif(NODE is None, reason="node is not installed"),
 ]
 
@@ -49,18 +48,10 @@ def served():
     found.close()
 
 
-@pytest.fixture(scope="module", params=SETS)
-def static(request, folder):
-    """The page whose engine is a worker with the kernels of an instruction set."""
-    found = NodePage(folder, request.param)
-    yield found
-    found.close()
-
-
 @pytest.fixture(scope="module")
-def static_one(folder):
-    """For what no instruction set changes: one of them."""
-    found = NodePage(folder, SETS[0])
+def static(folder):
+    """The page whose engine is a worker with the kernels."""
+    found = NodePage(folder)
     yield found
     found.close()
 
@@ -138,9 +129,9 @@ def small_states():
         }  # fmt: skip
 
 
-def test_areas_and_squares_are_the_same(served, static_one):
+def test_areas_and_squares_are_the_same(served, static):
     for state in [*small_states(), *(FAR | {"sampling": s, "exact": True} for s in SAMPLINGS[5:])]:
-        check_drawn(served, static_one, state)
+        check_drawn(served, static, state)
 
 
 def test_pixels_of_each_scene_are_the_same(served, static):
@@ -168,18 +159,18 @@ def check_steps(one, two, state, method, bits=8):
     return check(one, two, "steps.js", "recorded", state, method, bits)
 
 
-def test_steps_of_each_method_are_the_same(served, static_one):
+def test_steps_of_each_method_are_the_same(served, static):
     states = [one for one in random_states() if len(one["triangles"]) < 12][:1]
     states = [DEEP, *(one | {"size": [min(n, 24) for n in one["size"]]} for one in states)]
     for method in TRACED:
         for i, state in enumerate(states):
-            assert "steps" in check_steps(served, static_one, state, method, (8, 0, 4)[i % 3])
+            assert "steps" in check_steps(served, static, state, method, (8, 0, 4)[i % 3])
 
 
-def test_steps_of_far_vertices_and_windows_are_the_same(served, static_one):
+def test_steps_of_far_vertices_and_windows_are_the_same(served, static):
     for name in [name for name in SCENES if name.startswith(("far", "large"))][:6]:
         for method in ("edge", "scanline", "row_crossing"):
-            check_steps(served, static_one, scene(name), method)
+            check_steps(served, static, scene(name), method)
 
 
 WHOLE = SQUARE | {"vertices": [[0, 0], [900, 0], [0, 900], [900, 900]], "size": [256, 256]}
@@ -198,22 +189,22 @@ VERY_FAR = SQUARE | {"vertices": [[1.5, 2**52], [9.5, 1.5], [1.5, 9.5], [9.5, 9.
         (VERY_FAR, "lerp_scanline", 8, "vertices must lie within"),
     ],
 )
-def test_steps_are_refused_with_the_same_sentence(served, static_one, state, method, bits, message):
-    assert re.match(message, check_steps(served, static_one, state, method, bits))
+def test_steps_are_refused_with_the_same_sentence(served, static, state, method, bits, message):
+    assert re.match(message, check_steps(served, static, state, method, bits))
 
 
-def test_races_are_the_same(served, static_one):
+def test_races_are_the_same(served, static):
     harsh = ["far", "far", "far-sliver", "sliver", "edge", "edge"]
     cases = [(name, share, i + k) for i, name in enumerate(FAMILIES) for k, share in enumerate((0, 0.5))]
     for family, share, i in [*cases, *((name, 1, i) for i, name in enumerate(harsh))]:
         positions = [round(share * (len(axis.values) - 1)) for axis in FAMILIES[family].axes]
         view = {"family": family, "positions": positions, "seed": i % N_SEEDS}
-        check(served, static_one, "race.js", ("race", "raceColumn")[i % 2], view)
+        check(served, static, "race.js", ("race", "raceColumn")[i % 2], view)
 
 
 @pytest.mark.parametrize("view", [{"family": "none", "positions": [1]}, {"family": "fan", "positions": [1, 2]}])
-def test_races_are_refused_with_the_same_sentence(served, static_one, view):
-    assert "got" in check(served, static_one, "race.js", "race", view | {"seed": 0})
+def test_races_are_refused_with_the_same_sentence(served, static, view):
+    assert "got" in check(served, static, "race.js", "race", view | {"seed": 0})
 
 
 def test_window_far_away_is_the_same(served, static):

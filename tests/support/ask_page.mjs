@@ -1,13 +1,13 @@
-// Calls functions of the page outside a browser: node ask_page.mjs PAGE [SITE SET]. Each line of standard input is JSON: a call
+// Calls functions of the page outside a browser: node ask_page.mjs PAGE [SITE]. Each line of standard input is JSON: a call
 // {module, name, given, is_hashed} of a function of the folder PAGE, whose first arguments are the page's line and what it
 // begins with, or the answer {header, parts} to a question. Each line of standard output is a call's {result} or {error}, or a question
-// {ask, parts}; with SITE, which `topleft explore --export` has written, its worker answers questions, with the kernels of SET.
+// {ask, parts}; with SITE, which `topleft explore --export` has written, its worker answers questions.
 import {createHash} from "node:crypto";
 import {readFile} from "node:fs/promises";
 import {createInterface} from "node:readline";
 import {pathToFileURL} from "node:url";
 
-const [page, site, set] = process.argv.slice(2), at = (folder, name) => new URL(name, pathToFileURL(`${folder}/`));
+const [page, site] = process.argv.slice(2), at = (folder, name) => new URL(name, pathToFileURL(`${folder}/`));
 const {notebookLine} = await import(at(page, "line.js"));
 const plain = (_, value) => ArrayBuffer.isView(value) ? Array.from(value, Number) : value;
 const hashed = (_, value) => ArrayBuffer.isView(value) ? `${value.constructor.name} ${createHash("sha256").update(value).digest("hex")}` : value;
@@ -17,7 +17,7 @@ let answerer = null, kernels = null, hear;
 if (site) {
   const [{Kernels}, {Answerer}] = [await import(at(site, "kernels.js")), await import(at(site, "local.js"))];
   const load = async (name) => (({buffer, byteOffset, length}) => buffer.slice(byteOffset, byteOffset + length))(await readFile(at(site, name)));
-  kernels = await Kernels.of(await readFile(at(site, `topleft-${set}.wasm`)));
+  kernels = await Kernels.of(await readFile(at(site, "topleft.wasm")));
   answerer = new Answerer(kernels, JSON.parse(await readFile(at(site, "data.json"), "utf8")), load);
 }
 const model = {

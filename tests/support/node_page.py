@@ -19,7 +19,7 @@ PAGE = files("topleft._apps.explore").joinpath("page")
 
 
 class NodePage:
-    """A page; `site` and `instruction_set`: the folder that `--export` has written, and its kernels."""
+    """A page; `site`: the folder that `--export` has written, whose kernels answer in place of Python."""
 
     def __init__(self, *site):
         command = [NODE, str(Path(__file__).with_name("ask_page.mjs")), str(PAGE), *map(str, site)]

@@ -23,11 +23,11 @@ from topleft.methods import CLASSICS
 from topleft.methods.classics.classic_kernels import FORMS
 from topleft.scene_families import FAMILIES, walk
 
-SETS = ("simd128", "scalar")
-"""The instruction sets of the kernels; a page fetches the first that the browser runs."""
+MODULE = "topleft.wasm"
+"""The kernels; `packaging/wasm.py` compiles them."""
 
-IN_PLACE_OF_PYTHON = ("worker.js", "local.js", "kernels.js")
-"""The modules that answer the page."""
+IN_PLACE_OF_PYTHON = ("worker.js", "local.js", "kernels.js", MODULE)
+"""What answers the page."""
 
 TABS = ("pixels", "steps", "race")
 """The parts of a page without Python: only Python draws meshes."""
@@ -41,14 +41,12 @@ def write_static(folder: Path, content: Content) -> list[Path]:
     if content.mesh is not None:
         raise ValueError(f"--export must have no mesh, got {content.name!r}: a page without Python draws none")
     page = files("topleft._apps.explore").joinpath("page")
-    modules = {name: page.joinpath(name) for name in (f"topleft-{isa}.wasm" for isa in SETS)}
-    if missing := [name for name, module in modules.items() if not module.is_file()]:
+    if not page.joinpath(MODULE).is_file():
         raise MissingPackageError(
-            f"this installation has no {' and no '.join(missing)}: wheels of a release have them, and in a clone "
-            "python packaging/wasm.py makes them (apt-get install clang lld wasi-libc libclang-rt-dev-wasm32)"
+            f"this installation has no {MODULE}: wheels of a release have it, and in a clone "
+            "python packaging/wasm.py makes it (apt-get install clang lld wasi-libc libclang-rt-dev-wasm32)"
         )
     contents = {name: page.joinpath(name).read_bytes() for name in ("explore.css", *SCRIPTS, *IN_PLACE_OF_PYTHON)}
-    contents |= {name: module.read_bytes() for name, module in modules.items()}
     contents["index.html"] = static_html(page).encode()
     contents["data.json"] = json.dumps(data_of(content), allow_nan=False, separators=(",", ":")).encode()
     contents["race.bin"] = race_scenes()[1]

@@ -14,10 +14,6 @@ export class OutOfMemory extends Error {
   }
 }
 
-// A module with one vector instruction: a browser that takes it has SIMD128.
-const PROBE = new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11]);
-export const setOf = () => WebAssembly.validate(PROBE) ? "simd128" : "scalar";
-
 export class Kernels {
   // `module`: a WebAssembly.Module, or the bytes of one.
   static async of(module) {

@@ -1,6 +1,6 @@
 // The worker of a page without Python: fetches the kernels and what Python has written down, then answers.
 
-import {Kernels, setOf} from "./kernels.js";
+import {Kernels} from "./kernels.js";
 import {Answerer} from "./local.js";
 
 const fetched = async (name, take) => {
@@ -13,7 +13,7 @@ const load = (name) => fetched(name, (answer) => answer.arrayBuffer());
 
 const ready = (async () => {
   const [module, data] = await Promise.all([
-    load(`topleft-${setOf()}.wasm`).then((bytes) => WebAssembly.compile(bytes)),
+    load("topleft.wasm").then((bytes) => WebAssembly.compile(bytes)),
     fetched("data.json", (answer) => answer.json()),
   ]);
   return new Answerer(await Kernels.of(module), data, load);

@@ -2,13 +2,8 @@
  * In: arrays that the page has written into memory of `web_room`.  Out: buffers there.  Every picture is drawn by the
  * table of kernels that Python calls; what stands here is what the verbs of topleft._core.raster do between two of its
  * calls.  The module has one scene and one caller; it imports nothing. */
-#ifdef __wasm_simd128__
 #include "isa_simd128.c"
 #define K tl_kernels_simd128
-#else
-#include "isa_scalar.c"
-#define K tl_kernels_scalar
-#endif
 
 #define WEB_EXPORT(name) __attribute__((export_name(#name)))
 #define WEB_FULL -2 /* no memory is left */
