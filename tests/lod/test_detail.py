@@ -14,7 +14,7 @@ BLOB = tl.Mesh(*tl.scenes.shape("blob", n_triangles=6000))
 KNOT = tl.Mesh(*tl.scenes.shape("torus-knot", segments=128, sections=16))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=8)
 @given(
     mesh=st.sampled_from([BLOB, KNOT]),
     azimuth=st.floats(0, 360),
@@ -29,7 +29,7 @@ def test_silhouette_never_moves_by_more_than_the_tolerance(mesh, azimuth, elevat
     check_outlines(mesh, tl.Camera.perspective(view, near=0.01, far=1000, fov_y_deg=fov), tolerance)
 
 
-@settings(deadline=None, max_examples=8)
+@settings(deadline=None, max_examples=5)
 @given(
     azimuth=st.floats(0, 360),
     height=st.floats(0.5, 40),

@@ -87,7 +87,7 @@ def test_measure_fold_between_two_far_feet_is_found():
     assert 1 <= apart.bound <= 1 + SHARE
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 12), m=st.integers(1, 12), scale=st.sampled_from([0.01, 0.3, 1.0]))
 def test_measure_bound_holds_for_soups(seed, n, m, scale):
     one, other = soup(seed, n, scale), soup(seed + 1, m, scale)
@@ -99,7 +99,7 @@ def test_measure_bound_holds_for_soups(seed, n, m, scale):
     assert apart.bound <= apart.known + max(SHARE * apart.known, LEAST * size) + ROUNDING
 
 
-@settings(deadline=None, max_examples=20)
+@settings(deadline=None, max_examples=8)
 @given(seed=st.integers(0, 2**31), amount=st.sampled_from([1e-6, 1e-3, 0.1]))
 def test_measure_bound_holds_for_shaken_meshes(seed, amount):
     points, triangles = scenes.blob(200)

@@ -78,7 +78,7 @@ def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, m
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(20))
 def test_scene_is_drawn_as_its_instances_alone(isa, seed, monkeypatch):
     monkeypatch.setattr(draw_scene, "FIRST_ROUND", 2)
     rng = np.random.default_rng(seed)
@@ -133,7 +133,7 @@ def test_instances_that_cannot_show_are_not_snapped(depth_test, sampling, monkey
     assert_same(np.asarray(frags.samples_depth), np.asarray(whole.samples_depth))
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(16))
 def test_material_of_an_instance_is_as_good_as_one_of_its_mesh(seed):
     """Whatever it does: colours, textures, holes, glass, backs that are culled, in each sampling."""
     rng = np.random.default_rng(seed)

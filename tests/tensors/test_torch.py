@@ -465,64 +465,6 @@ def test_gradients_of_antialias():
 # programs like the samples of nvdiffrast
 
 
-def test_sample_triangle_has_the_colours_of_its_corners():
-    glctx = dr.RasterizeCudaContext()
-    pos = torch.tensor([[[-0.8, -0.8, 0, 1], [0.8, -0.8, 0, 1], [-0.8, 0.8, 0, 1]]])
-    tri = torch.tensor([[0, 1, 2]], dtype=torch.int32)
-    rast, _ = dr.rasterize(glctx, pos, tri, resolution=[256, 256])
-    out, _ = dr.interpolate(torch.eye(3)[None], rast, tri)
-    image = out.numpy()[0, ::-1]  # row 0 on top
-    expected = [(231 - i + 0.5 - 0.6) / 204.8 for i in (60, 200)]  # green and blue grow by 1 in 204.8 pixels
-    for row, blue in zip((60, 200), expected, strict=True):
-        green = (40 + 0.5 - 25.6) / 204.8
-        blue = (255 - row + 0.5 - 25.6) / 204.8
-        np.testing.assert_allclose(image[row, 40], [1 - green - blue, green, blue], atol=1e-6)
-    assert not image[20, 200].any()
-
-
-def test_sample_cube_finds_its_colours_again():
-    pos, tri = cube(torch.float32)
-    glctx = dr.RasterizeGLContext()
-
-    def render(colors, resolution=24):
-        rast, _ = dr.rasterize(glctx, pos, tri, resolution=[resolution, resolution])
-        picture, _ = dr.interpolate(colors[None], rast, tri)
-        return dr.antialias(picture, rast, pos, tri)
-
-    wanted = render(random(8, 3, dtype=torch.float32))
-    colors = torch.full((8, 3), 0.5, requires_grad=True)
-    optimizer = torch.optim.Adam([colors], lr=0.05)
-    losses = []
-    for _ in range(60):
-        loss = ((render(colors) - wanted) ** 2).mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        losses.append(loss.item())
-    assert losses[-1] < losses[0] / 100
-
-
-def test_silhouettes_move_a_triangle_to_where_it_should_be():
-    corners = torch.tensor([[-0.5, -0.5, 0, 1], [0.5, -0.4, 0, 1], [0.0, 0.6, 0, 1]])
-    tri = torch.tensor([[0, 1, 2]])
-    white = torch.ones((3, 1))
-
-    def render(shift):
-        pos = (corners + torch.cat([shift, torch.zeros(2)]))[None]
-        rast, _ = dr.rasterize(CTX, pos, tri, (32, 32))
-        return dr.antialias(dr.interpolate(white, rast, tri)[0], rast, pos, tri)
-
-    wanted = render(torch.tensor([0.15, -0.1]))
-    shift = torch.zeros(2, requires_grad=True)
-    optimizer = torch.optim.Adam([shift], lr=0.01)
-    for _ in range(80):
-        loss = ((render(shift) - wanted) ** 2).mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-    np.testing.assert_allclose(shift.detach().numpy(), [0.15, -0.1], atol=0.005)
-
-
 def test_sample_earth_is_the_loop():
     vertices, triangles = scenes.icosphere(1)
     uv = torch.tensor(
