@@ -140,20 +140,15 @@ def test_orbit_camera_sees_the_origin_in_the_middle():
     assert (abs(x) < 1e-12, abs(y) < 1e-12, round(w, 9)) == (True, True, 3)
 
 
-def test_fields_that_are_timed_are_whole(monkeypatch):
-    monkeypatch.setattr(others, "OTHER_FIELDS", {})
-    (_, field), (_, heights) = others.field_beside_others()
-    for draw, size in ((field["topleft field"], others.HD), (heights["topleft height_map"], (400, 400))):
-        found = draw()
-        assert found.shape == size[::-1]
-        assert np.isfinite(found).all()
-
-
 @pytest.mark.parametrize("kind", pairs.PAIRS)
 def test_pairs_draw_the_same_work_and_are_printed(monkeypatch, kind):
     needed = {"rle": "pycocotools", "gradients": "torch"}
     pytest.importorskip(needed.get(kind, "topleft"))
     monkeypatch.setattr(pairs, "TERRAINS", (3_000,))
+    for module, name in ((pairs, "UHD"), (pairs, "HD"), (others, "HD")):
+        monkeypatch.setattr(module, name, (64, 48))
+    planar_mesh = tl.scenes.planar_mesh
+    monkeypatch.setattr(tl.scenes, "planar_mesh", lambda n, *size: planar_mesh(min(n, 300), *size))
     scene, calls = next(iter(pairs.PAIRS[kind].scenes()))
     assert len(calls) > 1
     rows = [{"scene": scene, "call": name, "ms": [1.0 + k, 2.0]} for k, name in enumerate(calls)]

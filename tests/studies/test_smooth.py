@@ -15,8 +15,8 @@ ISA = tl.build_info()["isa"]
 
 @pytest.fixture(scope="module")
 def record():
-    """Our three ways to draw the smallest scene, and the scenes whose errors count."""
-    return run_cases(RunOptions(["tiny-smooth", "smooth-singles", "smooth-seams"], [], [ISA], repeats=1, seconds=0))
+    """Our three ways to draw the smallest scene."""
+    return run_cases(RunOptions(["tiny-smooth"], [], [ISA], repeats=1, seconds=0))
 
 
 def test_area_error_by_hand():
@@ -37,20 +37,8 @@ def test_every_way_takes_part(record):
     assert [entry["name"] for entry in record["scenes"][0]["runs"]] == names
 
 
-def test_areas_of_single_triangles_are_right_but_for_the_snap(record):
-    one_by_one, summed, msaa4 = (entry["error"] for entry in record["scenes"][1]["runs"])
-    assert summed["rms"] < one_by_one["rms"] < 0.0015 < 0.05 < msaa4["rms"]
-    assert summed["worst"] < 0.0056  # sqrt(2) edge lengths in the pixel, half of 1/256 px each
-
-
-def test_mesh_has_no_seams_summed_or_sampled(record):
-    one_by_one, summed, msaa4 = (entry["error"]["wrong_px"] for entry in record["scenes"][2]["runs"])
-    assert (summed, msaa4) == (0, 0)
-    assert one_by_one > 100_000
-
-
 def test_tables_name_each_way_once(record):
-    text = smooth_tables.errors_text(record)
+    text = smooth_tables.times_text(record)
     for way in load_peer("topleft").WAYS["smooth-fill"]:
         assert text.count(f"| topleft {ISA} {way} ") == 1
-    assert smooth_tables.times_text(record).count("\n") == 4
+    assert text.count("\n") == 4
