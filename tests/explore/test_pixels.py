@@ -114,16 +114,6 @@ def test_difference_counts_what_two_methods_draw_apart(draw):
     assert more_often == (is_shared & (panels["b"]["counts"] > 1)).sum() > 0
 
 
-def test_production_is_never_wrong_on_the_grid_that_holds_the_vertices(draw):
-    panels = draw(SQUARE | {"exact": True, "other": "bresenham_scanline"})
-    assert panels["a"]["n_wrong"] == 0 < panels["b"]["n_wrong"]
-
-
-@pytest.mark.parametrize("sampling", ["area", "outer", "inner"])
-def test_production_is_never_wrong_where_coverage_alone_is_known(draw, sampling):
-    assert draw(SQUARE | {"exact": True, "sampling": sampling})["a"]["n_wrong"] == 0
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_scene_by_its_name_is_drawn_by_every_panel(draw, name):
     reply = ask("pixels.scene", name=name)

@@ -98,11 +98,6 @@ def test_distance_is_the_layer(subject, camera):
     np.testing.assert_allclose(found, expected, rtol=1e-6)  # float32 at the corners, and once more
 
 
-def test_distance_of_clusters_is_that_of_the_mesh():
-    found = [tl.rasterize_mesh(MESH, CAMERA, SIZE).distance(CAMERA) for _ in range(4)]
-    assert all(np.array_equal(found[0], other) for other in found[1:])
-
-
 @pytest.mark.parametrize("vertices", [[[0, 0], [4, 0], [0, 4]], [[0, 0, 0, 1], [4, 0, 0, 1], [0, 4, 0, 1]]])
 def test_distance_without_the_world_is_refused(vertices):
     with pytest.raises(ValueError, match=r"distance needs vertices \(V, 3\) in the world"):

@@ -239,13 +239,6 @@ def test_blended_through_a_lens():
     assert (bent != straight).any()
 
 
-@pytest.mark.usefixtures("shared_rows")
-@pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_blended_threads_change_no_bit(sampling):
-    one, many = (tl.render(MESH, CAMERA, SIZE, threads=n, sampling=sampling) for n in (1, 5))
-    assert_same(many, one)
-
-
 def test_sampling_without_an_order_is_refused():
     with pytest.raises(ValueError, match="sampling 'area' gives no ids"):
         tl.render(MESH, CAMERA, SIZE, sampling="area")

@@ -198,11 +198,6 @@ def test_picture_of_a_scene_is_that_of_one_mesh(sampling, bits):
     assert_same(tl.render(SCENE, CAMERA, SIZE, **options), expected)
 
 
-def test_picture_in_a_batch_is_that_alone():
-    (result,) = tl.render_batch([tl.Job(SCENE, CAMERA, SIZE)])
-    assert_same(result.picture, tl.render(SCENE, CAMERA, SIZE))
-
-
 def test_hole_of_a_turned_instance_shows_the_other():
     wall = tl.Mesh([[-9, -9, -1], [9, -9, -1], [9, 9, -1], [-9, 9, -1]], [[0, 1, 2], [0, 2, 3]])
     turn = np.diag([-1.0, 1.0, -1.0, 1.0])  # half a turn: its back is seen
@@ -267,9 +262,3 @@ def test_glass_is_as_opaque_as_its_layers(subject):
     count = (expected_layers(5)[0] >= 0).sum(0)
     assert len(np.unique(count)) > 3
     assert_same(picture[..., 3], np.rint(255 * (1 - 0.8**count)).astype(np.uint8))
-
-
-def test_glass_of_a_mesh_is_that_of_its_scene():
-    options = {"opacity": 0.3, "shading": "unlit"}
-    a, b = (tl.render_transparent(subject, CAMERA, SIZE, **options) for subject in (MESH, SCENE))
-    assert_same(a, b)

@@ -87,11 +87,6 @@ def test_layers_in_kept_memory_are_those_without(sampling):
     assert np.shares_memory(found["depth"], kept.rasterize(np.zeros((3, 3)), [[0, 1, 2]]).depth)
 
 
-def test_layers_of_what_as_mesh_takes():
-    found = look(CAMERAS["perspective"], "triangle", subject=(CUBE.vertices, CUBE.triangles))
-    assert_same(found["triangle"], look(CAMERAS["perspective"], "triangle", subject=CUBE)["triangle"])
-
-
 def test_color_with_an_opacity_is_that_of_glass():
     found = look(CAMERAS["perspective"], "color", "depth", opacity=0.3, shading="flat")
     expected = tl.render_transparent(scene(), CAMERAS["perspective"], SIZE, opacity=0.3, shading="flat")

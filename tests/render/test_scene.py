@@ -111,19 +111,6 @@ def test_scene_mirrored_instance_keeps_its_outside():
     assert_same(got, tl.render(turned, CAMERA, SIZE, cull="back", edges=True))
 
 
-def test_scene_picture_shows_each_instance_as_if_alone():
-    aside = np.eye(4)
-    aside[0, 3] = 3.5
-    scene, camera = tl.Scene([SPHERE, (CUBE, aside)]), Camera.look_at((2, 3, 9))
-    picture, frags = tl.render(scene, camera, SIZE), rasterize_mesh(scene, camera, SIZE)
-    moved = tl.Mesh(CUBE.vertices + [3.5, 0, 0], CUBE.triangles)
-    for k, mesh in enumerate([SPHERE, moved]):
-        own = frags.instance == k
-        assert own.sum() > 100
-        difference = picture[own].astype(int) - tl.render(mesh, camera, SIZE)[own]
-        assert np.abs(difference).max() <= 1  # the matrix of the instance is multiplied in another order
-
-
 @pytest.mark.parametrize("shading", ["smooth", "ids"])
 def test_scene_picture_of_samples_is_their_mean_each_triangle_shaded_once(shading):
     scene, background = many(), (10, 200, 30, 255)
