@@ -234,7 +234,7 @@ def test_polygons_of_a_file_become_a_raster(tmp_path, more, values, nodata):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        (["--values", "name"], "--values name: object 0 of"),
+        (["--values", "name"], "names are share, use"),
         (["--kind", "depth"], "polygons have numbers, values and a mask, got depth"),
         (["--surface", "lower"], "polygons have numbers, values and a mask, got lower"),
     ],

@@ -158,7 +158,7 @@ def test_save_image_over_a_folder_is_refused(tmp_path):
         ("a.png", PICTURE.astype(float), r"cannot write '.*a.png': .png holds uint8 .*; got float64 \(4, 5, 4\)"),
         ("a.jpg", PICTURE[..., :2], r".jpg holds uint8 \(H, W\), .*; got uint8 \(4, 5, 2\)"),
         ("a.tif", PICTURE[0, 0].astype(np.float32), r"holds .*, float64 \(H, W, K\); got float32 \(4,\)"),
-        ("a.tif", np.zeros((2, 3), np.int64), r"holds .*; got int64 \(2, 3\); \.npy holds it as it is"),
+        ("a.tif", np.zeros((2, 3), np.int16), r"holds .*; got int16 \(2, 3\); \.npy holds it as it is"),
         ("a.png", PICTURE[:0], r"a picture of shape \(0, 5, 4\) has no pixels"),
         ("a.png", {"x": PICTURE}, "several arrays by name need .npz"),
     ],

@@ -226,7 +226,13 @@ def test_bad_rings_are_named(rings, error, message):
     with pytest.raises(error, match=re.escape(message)):
         tl.polygons(rings, SIZE)
     with pytest.raises(error, match=re.escape(message)):
-        tl.overlap(rings, SIZE)
+        tl.overlap(rings, SIZE, subpixel_bits=8)
+
+
+def test_overlap_snaps_to_as_fine_a_grid_as_there_is():
+    ring = [(0.3, 0.3), (0.301, 0.3), (0.301, 0.301), (0.3, 0.301)]
+    assert tl.overlap([[ring]], (1, 1)).areas[0] == pytest.approx(1e-6, rel=0.05)
+    assert not len(tl.overlap([[ring]], (1, 1), subpixel_bits=8).areas)
 
 
 @pytest.mark.parametrize(

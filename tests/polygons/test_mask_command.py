@@ -71,7 +71,8 @@ def test_labels_of_a_property(files, run):
     assert np.unique(picture("zones.png")).tolist() == [0, 3, 700]
     status, lines = run("mask", "map.geojson", "-o", "zones.png", "--labels", "name")
     assert status == 2
-    assert "object 0 of map has None, not a whole number" in lines[0]
+    assert "no object of map.geojson has a whole number of 64 bits of this name, feature 0 has None" in lines[0]
+    assert lines[0].endswith("names are area, zone")
 
 
 def test_masks_of_each_image_of_coco(files, run):
@@ -132,6 +133,18 @@ def test_crowds_are_drawn_unless_left_out(files, run):
     assert (picture("m.png") == MASK).all()
     assert run("mask", "runs.json", "-o", "m.png", "--no-crowds") == (0, [])
     assert not picture("m.png").any()
+
+
+def test_crowds_that_are_left_out_keep_their_number(files, run):
+    runs = {"size": [3, 5], "counts": RUNS}
+    annotated(files, runs, runs)
+    content = json.loads(files.joinpath("runs.json").read_text())
+    content["annotations"][0]["iscrowd"] = 1
+    files.joinpath("runs.json").write_text(json.dumps(content))
+    assert run("mask", "runs.json", "-o", "m.png", "--labels", "index", "--no-crowds") == (0, [])
+    assert (picture("m.png") == 2 * MASK).all()
+    assert run("mask", "runs.json", "-o", "rle.json", "--no-crowds") == (0, [])
+    assert [one["id"] for one in json.loads(files.joinpath("rle.json").read_text())["annotations"]] == [1]
 
 
 @pytest.mark.parametrize(
@@ -299,14 +312,87 @@ def plane(files, points, **properties):
     files.joinpath("plane.json").write_text(json.dumps(feature))
 
 
-@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, -1, 1.5, 2**31, True, None, ["3"]])
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, 2**63, 1.5, None, ["3"]])
 def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
     plane(files, SQUARE, a=value)
     status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
-    if value is True:
-        assert (status, lines) == (0, [])
-    else:
-        assert (status, len(lines), "not a whole number from 0 on" in lines[0]) == (2, 1, True)
+    assert (status, len(lines), "has a whole number of 64 bits" in lines[0]) == (2, 1, True)
+
+
+WHOLE = [0, 1, True, 3.0, -1, 65536, 2**31, 2**53 + 1, 2**63 - 1, -(2**63)]
+
+
+@pytest.mark.parametrize("value", WHOLE)
+@pytest.mark.parametrize("command", [("mask", "--labels"), ("raster", "--values")])
+@pytest.mark.parametrize("nodata", [7, 2**62 + 1])
+def test_whole_numbers_keep_their_digits_beside_no_data(files, run, command, value, nodata):
+    rasterio = pytest.importorskip("rasterio")
+    plane(files, SQUARE, a=value)
+    where = "--size", "5x4", "--extent", 0, 5, 0, 4
+    if isinstance(value, float) and command[0] == "raster":
+        nodata = 7  # the raster is of floats
+    more = ["--quiet"] * (command[0] == "raster")
+    assert run(command[0], "plane.json", "-o", "m.tif", command[1], "a", *where, "--nodata", nodata, *more) == (0, [])
+    with rasterio.open(files / "m.tif") as found:
+        pixels = found.read(1)
+    assert str(nodata).encode() + b"\0" in files.joinpath("m.tif").read_bytes()  # rasterio gives it as a float
+    assert pixels.tolist() == [[nodata] * 5] + [[nodata] + [int(value)] * 3 + [nodata]] * 2 + [[nodata] * 5]
+
+
+def test_png_refuses_labels_that_it_does_not_hold(files, run):
+    for value in (-1, 65536):
+        plane(files, SQUARE, a=value)
+        status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
+        assert (status, "PNG holds numbers from 0 to 65535" in lines[0]) == (2, True)
+
+
+def zones(files, *properties):
+    """Write squares of a pixel, one beside the other, each with these properties."""
+    squares = [[[i, 0], [i + 1, 0], [i + 1, 1], [i, 1]] for i in range(len(properties))]
+    features = [
+        {"type": "Feature", "properties": said, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        for said, ring in zip(properties, squares, strict=True)
+    ]
+    features = [{**one, "id": 90 + i} for i, one in enumerate(features)]
+    files.joinpath("zones.json").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+
+
+@pytest.mark.parametrize(
+    ("values", "drawn", "said"),
+    [
+        ([0, 7], [0, 7], "objects lost in the background, which is 0 as well: see --nodata: 'feature 0'"),
+        ([5, None, 6], [5, 0, 6], "objects left out: 'feature 1 has None as a'"),
+        ([5, float("nan"), 6], [5, 0, 6], "objects left out: 'feature 1 has nan as a'"),
+        ([5, "x", 6], [5, 0, 6], "objects left out: \"feature 1 has 'x' as a\""),
+        ([5, [2], 6], [5, 0, 6], "objects left out: 'feature 1 has [2] as a'"),
+    ],
+)
+@pytest.mark.parametrize("command", [("mask", "--labels"), ("raster", "--values")])
+def test_objects_without_a_number_and_in_the_background_are_told(files, run, command, values, drawn, said):
+    zones(files, *({"a": value} for value in values))
+    where = "--size", f"{len(values)}x1", "--extent", 0, len(values), 0, 1
+    assert run(command[0], "zones.json", "-o", "m.tif", command[1], "a", *where)[0] == 1
+    assert run(command[0], "zones.json", "-o", "m.npy" if command[0] == "mask" else "m.zarr", command[1], "a", *where)[
+        1
+    ] == [f"topleft: 'zones.json': {said}"]
+    assert picture("m.tif").tolist() == [drawn]
+
+
+def test_words_leave_out_objects_without_a_word(files, run):
+    zones(files, {"a": "x"}, {}, {"a": "b"})
+    status, lines = run("mask", "zones.json", "-o", "m.png", "--labels", "a", "--size", "3x1", "--extent", 0, 3, 0, 1)
+    assert (status, lines) == (1, ["topleft: 'zones.json': objects left out: 'feature 1 has None as a'"])
+    assert picture("m.png").tolist() == [[2, 0, 1]]
+
+
+def test_property_wins_over_the_id_of_a_feature(files, run):
+    where = "--labels", "id", "--size", "2x1", "--extent", 0, 2, 0, 1
+    zones(files, {"id": 5}, {"id": 6})
+    assert run("mask", "zones.json", "-o", "m.png", *where) == (0, [])
+    assert picture("m.png").tolist() == [[5, 6]]
+    zones(files, {}, {})
+    assert run("mask", "zones.json", "-o", "m.png", *where) == (0, [])
+    assert picture("m.png").tolist() == [[90, 91]]
 
 
 @pytest.mark.parametrize(

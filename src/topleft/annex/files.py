@@ -6,11 +6,12 @@ from topleft._meshes.io import png
 from topleft._meshes.io.layer_files import layer_paths, save_layers
 from topleft._meshes.io.limits.budget import LIMITS, Budget
 from topleft._meshes.io.limits.npy import arrays_of
-from topleft._meshes.io.polygon_files import VECTOR_SUFFIXES, PolygonPicture, load_polygons
+from topleft._meshes.io.polygon_files import NO_RINGS, VECTOR_SUFFIXES, PolygonPicture, load_polygons
 from topleft._meshes.io.references import read_picture
 
 __all__ = [
     "LIMITS",
+    "NO_RINGS",
     "VECTOR_SUFFIXES",
     "Budget",
     "PolygonPicture",

@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from topleft import Grid, polygons, save_image
 from topleft._apps.cli.arguments import FAILED, UsageError, add_command, positive, size
-from topleft._apps.cli.report import complain, complain_of_lacks, write_json
+from topleft._apps.cli.labels import numbers_of, tell_of_background, words_of
+from topleft._apps.cli.report import complain, complaining, write_json
 from topleft._core.base.defaults import MAX_CROSSINGS, SUFFIXES
 from topleft._core.base.georeference import is_same_crs, transformed
-from topleft._core.base.notes import listening
 from topleft._core.base.options import Sampling
 from topleft.annex.files import PolygonPicture, annotation_members, annotation_of, encode_polygons, load_polygons
 from topleft.typing import RuleOption
@@ -35,10 +35,11 @@ polygons and run lengths, as lists and as text.
 
 OUT is a file, or for several images a pattern: masks/{name}.png, or masks/{folder}/{name}.png where images of several
 folders have one name; {index} is the number of the image. A mask is 255 inside and 0 outside, with --sampling
-area and msaa2 to msaa16 the share of the pixel in between. --labels writes numbers: index, of the objects in their
-order from 1 on, or a property of the features or annotations, such as category_id; 0 where nothing is, or --nodata. PNG
-holds numbers up to 65535; .npy and TIFF hold all. Words of a property are numbered from 1 on in the order of the
-alphabet, and OUT.legend.json says which is which.
+area and msaa2 to msaa16 the share of the pixel in between. --labels writes numbers: index, of the objects of the file
+in their order from 1 on, or a property of the features or annotations, such as category_id; 0 where nothing is, or
+--nodata. PNG holds numbers from 0 to 65535; .npy and TIFF hold whole numbers of 64 bits. Words of a property are
+numbered from 1 on in the order of the alphabet, and OUT.legend.json says which is which. Objects without a number, and
+objects with the number of the background, are told.
 
 A .tif of polygons on a plane is a GeoTIFF. Its CRS is that of the file (of GeoJSON degrees of WGS84, EPSG:4326), or
 --crs, to which the polygons are then transformed. --like RASTER takes size, extent, CRS and nodata of a raster.
@@ -50,17 +51,16 @@ its area and its box.
 
 def run_mask(options: argparse.Namespace) -> int:
     """Write masks or labels of the polygons in a file."""
-    with listening() as lacks:
+    with complaining() as lacks:
         pictures = load_polygons(
             options.file, has_crowds=not options.no_crowds, layer=options.layer, image=options.image
         )
-    complain_of_lacks(lacks)
-    if options.image is not None and not pictures:
-        raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
-    if Path(options.out).suffix.lower() == ".json":
-        write_annotations(pictures, options)
-    else:
-        write_pictures(pictures, options)
+        if options.image is not None and not pictures:
+            raise UsageError(f"--image {options.image}: {options.file} has no image of that name")
+        if Path(options.out).suffix.lower() == ".json":
+            write_annotations(pictures, options)
+        else:
+            write_pictures(pictures, options)
     return FAILED if lacks else 0
 
 
@@ -97,6 +97,8 @@ def write_annotations(pictures: list[PolygonPicture], options: argparse.Namespac
         images.append(picture.image or {"id": 1, "file_name": picture.name, "width": width, "height": height})
         rles = encode_polygons(given, frame, options.rule, owners=picture.owners)  # none of the last without polygons
         for said, own, part, rle in zip_longest(picture.objects, picture.annotations, picture.parts, rles):
+            if options.no_crowds and said.get("iscrowd"):
+                continue
             if own is not None:
                 annotations.append({"iscrowd": 0, **own, **annotation_members(rle)} if len(part.counts) else own)
             elif len(part.counts):
@@ -136,42 +138,38 @@ Frame = tuple[int, int] | Grid
 
 def draw(picture: PolygonPicture, options: argparse.Namespace) -> tuple[npt.NDArray[Any], Frame, dict[int, str]]:
     """Return the mask or the labels of a picture, its frame, and the words behind labels."""
+    labels, legend = (None, {}) if options.labels is None else labels_of(picture, options)
     rings, frame = frame_of(picture, options)
     how: dict[str, Any] = {"rule": options.rule, "sampling": options.sampling, "threads": options.threads}
     how["max_crossings"] = options.max_crossings
-    if options.labels is None:
+    if labels is None:
         mask = polygons(rings, frame, **how)
         return np.rint(mask * np.float32(255)).astype(np.uint8), frame, {}
-    labels, legend = labels_of(picture, options.labels)
     said = frame.nodata if options.nodata is None and isinstance(frame, Grid) else options.nodata
     empty = 0 if said is None else int(said)
+    tell_of_background(picture, labels, empty, options.file)
     drawn = polygons(rings, frame, values=labels[picture.owners], background=empty, **how)
-    if Path(options.out).suffix.lower() != ".npy":
-        least, largest = min(empty, 0), max(int(labels.max(initial=0)), empty)
-        if largest > 65535 and Path(options.out).suffix.lower() == ".png":
-            raise UsageError(
-                f"--labels {options.labels}: PNG holds numbers up to 65535, got {largest}; write .npy or .tif"
-            )
-        drawn = drawn.astype(np.int32 if least < 0 or largest > 65535 else np.uint8 if largest < 256 else np.uint16)
+    suffix, ends = Path(options.out).suffix.lower(), (int(labels.min(initial=empty)), int(labels.max(initial=empty)))
+    if suffix == ".png" and not (0 <= ends[0] and ends[1] <= 65535):
+        raise UsageError(
+            f"--labels {options.labels}: PNG holds numbers from 0 to 65535, got {ends[0]} to {ends[1]}; "
+            "write .npy or .tif"
+        )
+    if suffix != ".npy":
+        sizes = [np.iinfo(dtype) for dtype in (np.uint8, np.uint16, np.int32, np.int64)]
+        drawn = drawn.astype(next(one.dtype for one in sizes if one.min <= ends[0] and ends[1] <= one.max))
     return drawn, frame, legend
 
 
-def labels_of(picture: PolygonPicture, name: str) -> tuple[npt.NDArray[np.int32], dict[int, str]]:
+def labels_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[npt.NDArray[Any], dict[int, str]]:
     """Return the number of each object, and the word of each number."""
-    if name == "index":
+    if options.labels == "index":
         return np.arange(1, len(picture.objects) + 1, dtype=np.int32), {}
-    values, labels = picture.values(name), np.zeros(len(picture.objects), np.int32)
-    if values and all(isinstance(value, str) for value in values.values()):
-        words, which = np.unique(np.array(list(values.values())), return_inverse=True)
-        labels[list(values)] = which + 1
-        return labels, dict(enumerate(words.tolist(), 1))
-    for i, value in values.items():
-        if not isinstance(value, (int, float)) or not 0 <= value < 2**31 or value != int(value):
-            raise UsageError(
-                f"--labels {name}: object {i} of {picture.name} has {value!r}, not a whole number from 0 on"
-            )
-        labels[i] = int(value)
-    return labels, {}
+    words = words_of(picture, options.labels, options.file)
+    return words or (
+        numbers_of(picture, "--labels", options.labels, options.file, options.nodata or 0, is_whole=True),
+        {},
+    )
 
 
 def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any, Frame]:

@@ -20,12 +20,12 @@ from topleft._apps.cli.arguments import (
     size,
     subpixel_bits,
 )
+from topleft._apps.cli.labels import numbers_of, tell_of_background, whole_or_float
 from topleft._apps.cli.render import client_of
-from topleft._apps.cli.report import complain, complain_of_lacks
+from topleft._apps.cli.report import complain, complaining
 from topleft._apps.tiles.tiles import Tiles, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
-from topleft._core.base.notes import listening
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft.annex.files import VECTOR_SUFFIXES, load_polygons
@@ -76,7 +76,7 @@ def run_raster(options: argparse.Namespace) -> int:
     if options.nodata is not None and not (is_tiff or options.values is not None):
         raise UsageError("--nodata is for --values and .tif: other pixels without triangles are -1, NaN or 0")
     try:
-        with ExitStack() as stack, listening() as lacks:
+        with ExitStack() as stack, complaining() as lacks:
             raster = raster_of(options)
             n_workers = options.threads or available_threads()
             client = None if options.dask is None else client_of(options.dask, n_workers, stack)
@@ -92,7 +92,6 @@ def run_raster(options: argparse.Namespace) -> int:
     if not (written.n_drawn or written.n_kept):
         shape = "polygon" if raster.is_of_polygons else "triangle"
         complain(f"no {shape} of {options.mesh} lies within {options.out}: all of it is blank")
-    complain_of_lacks(lacks)
     return FAILED if lacks and raster.is_of_polygons else 0
 
 
@@ -127,29 +126,22 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
         raise UsageError(f"{options.mesh} holds annotations of images: topleft mask draws them")
     if options.surface is not None or options.kind not in (None, "labels", "coverage"):
         raise UsageError(f"polygons have numbers, values and a mask, got {options.kind or options.surface}")
+    more_options: dict[str, Any] = {} if options.subpixel_bits == 8 else {"subpixel_bits": options.subpixel_bits}
+    nodata = options.nodata if options.nodata is not None else -1 if options.values is None else 0
+    numbers = np.arange(len(picture.objects), dtype=np.int32)
+    if options.values is not None:
+        numbers = numbers_of(picture, "--values", options.values, options.mesh, nodata, is_whole=False)
     (points, rings, offsets), crs = picture.polygons, options.crs or picture.crs
     if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
         points = transformed(points, picture.crs, crs)
     subject = points, rings, offsets
-    kind: Any = options.kind or "labels"
-    more_options: dict[str, Any] = {} if options.subpixel_bits == 8 else {"subpixel_bits": options.subpixel_bits}
-    if options.values is not None:
-        kind = "fill"
-        said = picture.values(options.values)
-        for i, value in said.items():
-            if not isinstance(value, int | float):
-                raise UsageError(f"--values {options.values}: object {i} of {options.mesh} has {value!r}, no number")
-        values = np.array([said.get(i, 0) for i in range(len(picture.objects))])
-        holds = values.dtype.kind in "bi" and (not values.size or np.abs(values).max() < 2**31)
-        more_options["values"] = values.astype(np.int32 if holds else np.float64)[picture.owners]
-    elif kind == "labels":
-        kind, more_options["values"] = "fill", np.arange(len(picture.objects), dtype=np.int32)[picture.owners]
-    nodata = -1 if options.nodata is None and options.values is None else options.nodata
     step = options.pixel_size if options.pixel_size is None or len(options.pixel_size) > 1 else options.pixel_size[0]
     grid = grid_around(options.extent or extent_of(subject), options.size, step, "up")
+    kind: Any = "coverage"
+    if options.kind != "coverage" or options.values is not None:
+        tell_of_background(picture, numbers, nodata, options.mesh)
+        kind, more_options["values"], more_options["background"] = "fill", numbers[picture.owners], nodata
     grid = replace(grid, crs=crs, nodata=None if kind == "coverage" else nodata)
-    if kind == "fill" and nodata is not None:
-        more_options["background"] = nodata
     return tiles(subject, grid, kind=kind, window=options.window, threads=options.threads, **more_options)
 
 
@@ -208,7 +200,7 @@ def add_raster_command(commands: Any) -> None:
     add("--kind", choices=DIRECT_KINDS, help="the content of pixels")
     add("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
-    add("--nodata", type=float, metavar="N", help="the background, in values and .tif")
+    add("--nodata", type=whole_or_float, metavar="N", help="the background, in values and .tif")
     add("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
     add("--uncompressed", action="store_true", help="store pixels as they are")
     add("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")

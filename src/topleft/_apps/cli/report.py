@@ -9,13 +9,15 @@ import json
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from topleft._apps.batch.batch import Result
 from topleft._apps.cli.arguments import UsageError
 from topleft._core.base.arrays import as_size
+from topleft._core.base.notes import listening
 from topleft._core.base.remote import is_url
 from topleft._core.base.whole_file import write_whole
 from topleft.errors import TopleftError
@@ -40,6 +42,16 @@ def complain_of_lacks(lines: Sequence[str], *, is_each_told: bool = False) -> No
     elif lines:
         n_more = len(lines) - MOST_LACKS
         complain("; ".join(lines[:MOST_LACKS]) + (f"; and {n_more} more (--warnings all)" if n_more > 0 else ""))
+
+
+@contextmanager
+def complaining() -> Iterator[list[str]]:
+    """Collect what files lack, and print it in one line at the end, also when an error ends the command."""
+    with listening() as lacks:
+        try:
+            yield lacks
+        finally:
+            complain_of_lacks(lacks)
 
 
 def one_line(error: BaseException) -> str:

@@ -126,7 +126,9 @@ def write_geotiff(
     own_crs = raster.grid.crs if raster.grid is not None and crs is None else crs
     geo = {} if raster.grid is None else geo_tags(own_crs, raster.grid.transform)
     dtype = np.dtype(np.uint8) if raster.dtype == bool else raster.dtype
-    told = raster.painter.nodata if nodata is None else as_number("nodata", nodata)
+    if nodata is not None:
+        as_number("nodata", nodata)
+    told = raster.painter.nodata if nodata is None else np.asarray(nodata).item()
     n_levels = n_levels_to(raster.size, side) if overviews else 1
     if n_levels > 1 and any(w % (2 * side) and w < n for w, n in zip(window, raster.size, strict=True)):
         raise ValueError(f"window must have sides of whole pairs of tiles, of {2 * side} pixels, got {window}")

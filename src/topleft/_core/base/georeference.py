@@ -108,8 +108,8 @@ def geo_tags(crs: str | int | None, transform: Six) -> Tags:
 
 def nodata_tag(nodata: float) -> tuple[str, bytes]:
     """The text of GDAL's tag of no data, 42113."""
-    whole = float(nodata)
-    text = repr(int(whole)) if np.isfinite(whole) and whole == int(whole) else repr(whole)
+    number = np.asarray(nodata).item()  # a whole number of 64 bits keeps its digits
+    text = repr(int(number)) if np.isfinite(number) and number == int(number) else repr(number)
     return "s", text.encode() + b"\0"
 
 

@@ -313,7 +313,7 @@ def overlap(
     crs: object = None,
     rule: RuleOption = "evenodd",
     origin: tuple[int, int] = (0, 0),
-    subpixel_bits: int = 8,
+    subpixel_bits: int = 16,
     assume_valid: bool = False,
     max_crossings: int = MAX_CROSSINGS,
     threads: int | None = None,
@@ -323,8 +323,10 @@ def overlap(
 
     Parameters
     ----------
-    rings, size, crs, rule, origin, subpixel_bits, assume_valid, max_crossings, threads
+    rings, size, crs, rule, origin, assume_valid, max_crossings, threads
         As in `polygons`. The table takes the `nodata` of a `Grid`.
+    subpixel_bits : int, 0 to 16
+        Points snap to ``2**-subpixel_bits`` pixels.
     triangles : array_like of integers, shape (T, 3), optional
         Then `rings` are the vertices (V, 2) of a mesh, and its triangles the polygons.
     out : Overlap, optional
@@ -345,7 +347,8 @@ def overlap(
 
     Notes
     -----
-    Each area has an error below ``2**-24`` for each edge that passes its pixel. Where polygons tile a pixel, its areas
+    Points move by up to half of ``2**-subpixel_bits`` pixels along x and y when they snap. Of the snapped polygons each
+    area has an error below ``2**-24`` for each edge that passes its pixel. Where polygons tile a pixel, its areas
     sum to 1 within as much; the areas of a polygon sum to its area inside of the frame.
 
     Examples

@@ -24,7 +24,13 @@ from topleft._meshes.io import png, tiff
 from topleft.errors import ImageError
 
 BYTES = ("uint8 (H, W)", "uint8 (H, W, 3)", "uint8 (H, W, 4)")
-NUMBERS = (*BYTES, "uint16 (H, W)", "int32 (H, W)", *(f"float{n} (H, W{k})" for k in ("", ", K") for n in (32, 64)))
+NUMBERS = (
+    *BYTES,
+    "uint16 (H, W)",
+    "int32 (H, W)",
+    "int64 (H, W)",
+    *(f"float{n} (H, W{k})" for k in ("", ", K") for n in (32, 64)),
+)
 HOLDS: Mapping[str, tuple[str, ...]] = {
     ".png": (*BYTES, "uint8 (H, W, 2)", "uint16 (H, W)"),
     ".jpg": BYTES,
@@ -61,7 +67,7 @@ def save_image(
         is whatever fsspec can write to, "s3://bucket/name.png".
     image : (H, W), (H, W, 3) or (H, W, 4) uint8, or (H, W) bool
         The picture; a mask becomes 0 and 255. PNG also holds (H, W, 2) uint8, grey with alpha, and (H, W) uint16; TIFF
-        also (H, W) of uint16, int32, float32 or float64, and (H, W, K) of floats, a page for each channel. For .npy
+        also (H, W) of uint16, int32, int64, float32 or float64, and (H, W, K) of floats, a page a channel. For .npy
         any array, for .npz any array or several by name. PNG holds neither ids nor floats: they are refused, for they
         would have to be scaled, which `ViewLayers.save` does (ids plus 1, distances in millimetres); .tif and .npy hold
         both.

@@ -58,6 +58,10 @@ class PolygonPicture:
         self.parts.append(parts)
         self.objects.append(said)
 
+    def name_of(self, i: int) -> str:
+        """What an object is called in messages: by its id in a file of COCO, else by its place in the file."""
+        return f"annotation {self.objects[i].get('id', i)}" if self.annotations else f"feature {i}"
+
     def values(self, name: str) -> dict[int, Any]:
         """Return a property of each object that has polygons."""
         return {i: self.objects[i].get(name) for i, part in enumerate(self.parts) if len(part.counts)}
@@ -181,10 +185,11 @@ def _coco(content: Mapping[str, Any], notes: Notes, *, has_crowds: bool, chosen:
             key = annotation["image_id"]
             if key not in images:
                 raise ContentError(f"is of image {key!r}, which is not there")
-            if key in pictures and (has_crowds or not annotation.get("iscrowd")):
+            if key in pictures:
                 picture = pictures[key]
-                said = {**annotation, "category": names.get(annotation.get("category_id"))}
-                parts = _coco_parts(annotation.get("segmentation"), picture, what, notes)
+                said = {"category": names.get(annotation.get("category_id")), **annotation}
+                if has_crowds or not annotation.get("iscrowd"):  # one that is left out keeps its number
+                    parts = _coco_parts(annotation.get("segmentation"), picture, what, notes)
         if picture is not None:
             picture.add(parts, said)
             picture.annotations.append(annotation)
@@ -270,7 +275,7 @@ def _geojson(content: Mapping[str, Any], name: str, notes: Notes) -> PolygonPict
         with leaving_out(f"feature {i}", notes):
             is_feature = feature["type"] == "Feature"
             if is_feature:
-                said = {**(feature.get("properties") or {}), "id": feature.get("id")}
+                said = {**({"id": feature["id"]} if "id" in feature else {}), **(feature.get("properties") or {})}
             geometry = feature["geometry"] if is_feature else feature
             parts = _joined(list(_parts(geometry)) if geometry else [], f"feature {i}", notes)
         picture.add(parts, said)

@@ -145,7 +145,7 @@ class Painter:
         values = None if self.values is None else self.values.array[:0]
         sample = kind.draw(self, Payload(np.empty(0, np.int32), nothing, values), Crop((0, 0), (1, 1)))
         self.dtype, self.empty, self.channels = sample.dtype, sample[0, 0].copy(), sample.shape[2:]
-        self.nodata = float(self.empty) if kind.has_nodata and not self.channels else None
+        self.nodata = self.empty.item() if kind.has_nodata and not self.channels else None
         if kind.depth is not None and self.n_components == 2:
             self.low = self.high = 0.0
 
