@@ -243,3 +243,22 @@ def test_sampling_without_an_order_is_refused():
     with pytest.raises(ValueError, match="sampling 'area' gives no ids"):
         tl.render(MESH, CAMERA, SIZE, sampling="area")
     assert tl.render(MESH, CAMERA, (0, 4)).shape == (4, 0, 4)
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_blended_lies_over_cut_out_over_opaque_triangles_of_equal_depth(order, sampling):
+    clear_left = tl.Texture([[[0, 0, 255, 0], [0, 0, 255, 255]]], filter="nearest")
+    body, label = tl.Material((255, 0, 0), unlit=True), tl.Material(texture=clear_left, alpha_cutoff=0.5, unlit=True)
+    pane = tl.Material((255, 255, 255), opacity=0.5, alpha_mode="blend", unlit=True)
+    rows = np.repeat(order, 2)
+    mesh = tl.Mesh(
+        np.tile(CORNERS, (3, 1)), np.concatenate([TRIANGLES + 4 * i for i in range(3)]),
+        uv=np.tile([[0, 0], [1, 0], [1, 1], [0, 1]], (3, 1)), materials=(body, label, pane), material_of_triangle=rows,
+    )  # fmt: skip
+    got = tl.render(mesh, CAMERA, (64, 64), sampling=sampling)
+    assert got[32, 24, :3].tolist() == [255, 188, 188]  # half of the light of white, half of red
+    assert got[32, 40, :3].tolist() == [188, 188, 255]
+    two = replace(mesh, triangles=mesh.triangles[rows < 2], material_of_triangle=rows[rows < 2])
+    got = tl.render(two, CAMERA, (64, 64), sampling=sampling)
+    assert (got[32, 24, :3].tolist(), got[32, 40, :3].tolist()) == ([255, 0, 0], [0, 0, 255])

@@ -145,13 +145,13 @@ class TransparentPass:
 
     def peel(self, frags: Fragments, k: int) -> tuple[npt.NDArray[np.int32], F32]:
         """The layers of a sample that nothing opaque hides, planes (K, H, W) of ids and depths."""
-        (there, nearest), at = (planes[k] for planes in frags.drawn_planes), self.placed.positions[k]
+        nearest, at = frags.drawn_planes[1][k], self.placed.positions[k]
         for n in (LAYERS, MOST_LAYERS):
             ids, depth = peel_meshes(SCRATCH, [self.snapped], self.view, n, is_farthest=False, at_fx=at)
             for own_ids, own_depth in zip(ids, depth, strict=True):
                 if not (own_ids >= 0).any():
                     break
-                own_ids[(own_depth > nearest) | ((own_depth == nearest) & (own_ids > there) & (there >= 0))] = -1
+                own_ids[own_depth > nearest] = -1
             if not (ids[-1] >= 0).any():
                 break
         return ids, depth

@@ -112,8 +112,10 @@ def draw_solid(
     holed = holed_instances(placed.whole, cuts, placed.camera, placed.bent)
     solid = draw_ids(memory, placed.with_scene(solid_scene(placed.scene, holed, masks)), is_split=False)
     ids, depth = cast("tuple[I32, F32]", solid.drawn_planes)
-    for k, at in enumerate(placed.positions if ids.size else ()):
-        draw_holed(placed, holed, ids[k : k + 1], depth[k : k + 1], at=at, threads=placed.view.threads)
+    for k, at in enumerate(placed.positions if ids.size and holed else ()):
+        cut = np.full_like(ids[k : k + 1], -1)  # apart: at equal depth they hide the others, whatever the index
+        draw_holed(placed, holed, cut, depth[k : k + 1], at=at, threads=placed.view.threads)
+        np.copyto(ids[k : k + 1], cut, where=cut >= 0)
     return placed.fragments(ids, depth)
 
 
