@@ -65,10 +65,32 @@ def test_off_colors_of_faces_end_at_their_edges(load):
     assert mesh.colors[mesh.triangles][:, :, :3].tolist() == [[[255, 0, 0]] * 3, [[0, 0, 255]] * 3]
 
 
-def test_off_colors_that_one_face_lacks_are_left_out(load):
-    mesh = load(f"OFF\n4 2 0\n{SQUARE}3 0 1 2 255 0 0\n3 0 2 3\n")
-    assert mesh.colors is None
-    assert mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        ("255 0 0", "", [255, 255, 255, 255]),
+        ("255 0 0", "0 255 0 128", [0, 255, 0, 128]),
+        ("1.0 0.0 0.0", "0 1 0 0.2", [0, 255, 0, 51]),
+        ("255 0 0 1", "0 128 0 0.2", [0, 128, 0, 51]),
+    ],
+)
+def test_off_colors_and_opacity_of_some_faces_are_read(load, first, second, expected):
+    mesh = load(f"OFF\n4 2 0\n{SQUARE}3 0 1 2 {first}\n3 0 2 3 {second}\n")
+    assert mesh.colors[mesh.triangles[:, 0]].tolist() == [[255, 0, 0, 255], expected]
+
+
+@pytest.mark.parametrize(
+    ("vertex", "face", "message"),
+    [
+        ("", "7", "colours of faces by a map of colours not read"),
+        (" 9 9 9", "255 0 0", "colours of faces beside those of vertices not drawn"),
+    ],
+)
+def test_off_colors_that_are_not_read_are_told(tmp_path, vertex, face, message):
+    rows = "".join(f"{row}{vertex}\n" for row in SQUARE.splitlines())
+    (tmp_path / "a.off").write_text(f"{'C' if vertex else ''}OFF\n4 2 0\n{rows}3 0 1 2 {face}\n3 0 2 3 {face}\n")
+    with pytest.warns(tl.MeshWarning, match=message):
+        assert len(tl.load(tmp_path / "a.off").triangles) == 2
 
 
 @pytest.mark.parametrize("rest", ["3 0 2 3\n", "3 0 2 3\n3 1 2 3\n"])

@@ -68,6 +68,35 @@ def test_ply_colors_keep_opacity_and_have_no_haze(load):
     assert mesh.materials == ()
 
 
+@pytest.mark.parametrize(
+    ("names", "attribute"),
+    [
+        ("diffuse_red diffuse_green diffuse_blue", "colors"),
+        ("r g b", "colors"),
+        ("normal_x normal_y normal_z", "normals"),
+        ("texture_u texture_v", "uv"),
+        ("u0 v0", "uv"),
+    ],
+)
+def test_ply_other_names_of_properties_are_read(load, names, attribute):
+    kind, values = ("uchar", [200, 0, 9]) if attribute == "colors" else ("float", [0, 1, 0])
+    more = "".join(f"property {kind} {name}\n" for name in names.split())
+    row = " ".join(map(str, values[: len(names.split())]))
+    mesh = load(
+        "element vertex 3\n" + XYZ + more + FACES.format(1), f"0 0 0 {row}\n1 0 0 {row}\n0 1 0 {row}\n3 0 1 2\n"
+    )
+    assert getattr(mesh, attribute)[0].tolist()[: len(names.split())] == values[: len(names.split())]
+
+
+def test_ply_properties_and_edges_that_are_not_read_are_told(load):
+    more = "property float quality\n" + FACES.format(1) + "property uchar flags\nelement edge 1\nproperty int a\n"
+    with pytest.warns(MeshWarning) as told:
+        load("element vertex 3\n" + XYZ + more, "0 0 0 1\n1 0 0 1\n0 1 0 1\n3 0 1 2 0\n0\n")
+    assert [str(one.message).partition(": ")[2] for one in told] == [
+        "properties of vertex not read: 'quality'", "properties of face not read: 'flags'", "lines not drawn",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(("kind", "value"), [("float", "0.5"), ("ushort", "32896"), ("double", "0.5")])
 def test_ply_colors_of_other_numbers_become_bytes(load, kind, value):
     rgb = "".join(f"property {kind} {name}\n" for name in ("red", "green", "blue"))

@@ -26,6 +26,8 @@ def mesh_of_faces(
     if not len(triangles):
         return None
     names = corners[triangles].astype(np.int32)
+    if colors is not None and colors_of_faces is not None:
+        source.notes.add("colours of faces beside those of vertices not drawn")
     if uv_of_corners is None and (colors_of_faces is None or colors is not None):
         return Mesh(positions, names, normals, colors, uv)
     source.budget.spend("max_vertices", names.size)

@@ -35,6 +35,19 @@ MAX_HEADER_BYTES = 1 << 20
 STRUCT_CODES = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d",
 }  # fmt: skip
+UV_NAMES = (
+    ("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("texcoord_u", "texcoord_v"),
+    ("tex_u", "tex_v"), ("texcoord_x", "texcoord_y"), ("u0", "v0"), ("s0", "t0"),
+)  # fmt: skip
+NORMAL_NAMES = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"), ("normalx", "normaly", "normalz"))
+COLOR_NAMES = (
+    ("red", "green", "blue", "alpha"), ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
+    ("r", "g", "b", "a"), ("color_red", "color_green", "color_blue", "color_alpha"),
+)  # fmt: skip
+READ_NAMES = {"x", "y", "z", "vertex_indices", "vertex_index", "texcoord", "alpha"}.union(
+    *UV_NAMES, *NORMAL_NAMES, *COLOR_NAMES
+)
+"""Properties of vertices and faces that are read."""
 
 
 @dataclass
@@ -102,8 +115,11 @@ def read_ply(source: InputFile) -> list[Mesh]:
     for element in elements:
         if element.name == "vertex":
             source.budget.spend("max_vertices", element.n)
-        elif element.n and element.name not in ("face", "tristrips", "edge", "camera", "obj_info"):
-            source.notes.add("elements not read", element.name)
+        elif element.n and element.name not in ("face", "tristrips", "camera", "obj_info"):
+            source.notes.add(*("lines not drawn",) if element.name == "edge" else ("elements not read", element.name))
+        for prop in element.properties if element.n and element.name in ("vertex", "face") else ():
+            if prop.name not in READ_NAMES:
+                source.notes.add(f"properties of {element.name} not read", prop.name)
         source.budget.spend("max_lines", min(element.n, len(content)))
     found = _found(content, order, elements, start, source)
     vertex = found.get("vertex")
@@ -114,7 +130,7 @@ def read_ply(source: InputFile) -> list[Mesh]:
     if not len(n_corners):
         positions = _together(vertex, (("x", "y", "z"),))
         if positions is not None and len(positions):
-            source.clouds.append(Cloud(positions, _colors(vertex), _together(vertex, (("nx", "ny", "nz"),))))
+            source.clouds.append(Cloud(positions, _colors(vertex), _together(vertex, NORMAL_NAMES)))
         return []
     mesh = _mesh(vertex, corners, n_corners, faces, source)
     del content, found, vertex, corners, n_corners, faces  # before a texture needs memory, too
@@ -405,7 +421,7 @@ def _mesh(vertex: Rows, corners: I64, n_corners: I64, face: Rows, source: InputF
     if isinstance(on_corners, _List) and (on_corners.lengths == 2 * n_corners).all():
         uv_of_corners = on_corners.values.reshape(-1, 2)
     return mesh_of_faces(
-        source, positions, corners, n_corners, normals=_together(vertex, (("nx", "ny", "nz"),)), colors=_colors(vertex),
+        source, positions, corners, n_corners, normals=_together(vertex, NORMAL_NAMES), colors=_colors(vertex),
         uv=_together(vertex, UV_NAMES), uv_of_corners=uv_of_corners, colors_of_faces=_colors(face),
     )  # fmt: skip
 
@@ -422,9 +438,6 @@ def _textured(mesh: Mesh, textures: list[str], source: InputFile) -> Mesh:
     return replace(mesh, materials=(Material(texture=Texture(picture[..., :3])),))
 
 
-UV_NAMES = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
-
-
 def _together(rows: Rows, choices: tuple[tuple[str, ...], ...]) -> Array | None:
     """The columns of the first choice that is there, (N, K) float."""
     for names in choices:
@@ -437,12 +450,11 @@ def _together(rows: Rows, choices: tuple[tuple[str, ...], ...]) -> Array | None:
 
 def _colors(rows: Rows) -> npt.NDArray[np.uint8] | None:
     """SRGB and opacity (N, 4), of bytes, of 16 bits, or of 0 to 1."""
-    for prefix in ("", "diffuse_"):
-        names = [prefix + name for name in ("red", "green", "blue")]
+    for *names, opacity in COLOR_NAMES:
         if not all(isinstance(rows.get(name), np.ndarray) for name in names):
             continue
         columns = [rows[name] for name in names]
-        alpha = rows.get(prefix + "alpha", rows.get("alpha"))
+        alpha = rows.get(opacity, rows.get("alpha"))
         if isinstance(alpha, np.ndarray):
             columns.append(alpha)
         bytes_ = np.full((len(columns[0]), 4), 255, np.uint8)

@@ -24,21 +24,36 @@ from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError
 
 N_HEADER_BYTES, N_TRIANGLE_BYTES = 84, 50
-ROWS = np.dtype([("", "V12"), ("corners", "<f4", 9), ("", "V2")])
+ROWS = np.dtype([("", "V12"), ("corners", "<f4", 9), ("color", "<u2")])
 HEAD = re.compile(rb"\s*((?:ST)?C?N?(4?)(n?)OFF)?(?=[\s\d]|$)", re.IGNORECASE)
 
 
 def read_stl(source: InputFile) -> list[Mesh]:
     """The triangles of an STL file, in one mesh; none if it has none."""
     content = source.content()
-    n = _n_triangles(content[:N_HEADER_BYTES], len(content))
+    n, colors = _n_triangles(content[:N_HEADER_BYTES], len(content)), None
     if n is None:
         corners = _corners_of_text(content)
     else:
-        corners = np.frombuffer(content, ROWS, n, N_HEADER_BYTES)["corners"].reshape(-1, 3)
+        rows = np.frombuffer(content, ROWS, n, N_HEADER_BYTES)
+        corners, colors = rows["corners"].reshape(-1, 3), _stl_colors(rows["color"], content[:N_HEADER_BYTES])
     source.budget.spend("max_vertices", len(corners))
     source.budget.spend("max_triangles", len(corners) // 3)
-    return [Mesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))] if len(corners) else []
+    faces = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    return [Mesh(corners, faces, None, colors)] if len(corners) else []
+
+
+def _stl_colors(values: Array, header: bytes) -> npt.NDArray[np.uint8] | None:
+    """Colours (3 T, 4) of 15 bits: of Magics, whose header has the colour of the others, or of VisCAM: else white."""
+    magics = re.search(rb"COLOR=(...)(.)", header, re.DOTALL)
+    has_color = (values < 1 << 15) & values.any() if magics else values >= 1 << 15
+    if magics is None and not has_color.any():
+        return None
+    rest = magics[1] + (magics[2].strip(b"\0") or b"\xff") if magics else b"\xff" * 4  # opacity of 0 says nothing
+    colors = np.full((len(values), 4), np.frombuffer(rest, np.uint8))
+    channels = values[has_color, None] >> np.array((0, 5, 10), np.uint16) & 31
+    colors[has_color, :3] = np.rint((channels if magics else channels[:, ::-1]) * (255 / 31))
+    return np.repeat(colors, 3, axis=0)
 
 
 def mapped_corners(path: Path) -> np.ndarray[tuple[int, int], np.dtype[np.float32]] | None:
@@ -102,7 +117,7 @@ def read_off(source: InputFile) -> list[Mesh]:
     if len(lines) > n_vertices + n_faces:  # numbers on a further line are no colours
         faces = None
     if faces is None and len(lines) == n_vertices + n_faces:
-        faces = _faces_of_lines(lines[n_vertices:])
+        faces = _faces_of_lines(lines[n_vertices:], source)
     if faces is None:  # rows that go over several lines, or some that are left over: corners, and no colours
         width = 3 + 3 * (b"N" in word) + 4 * (b"C" in word) + 2 * word.startswith(b"ST")
         if n_vertices * width > len(values):
@@ -115,7 +130,7 @@ def read_off(source: InputFile) -> list[Mesh]:
 
 
 Faces = tuple[I64, I64, Array | None]
-"""The corners of all faces, how many each has, and colours (F, 3 or 4) if all have some."""
+"""The corners of all faces, how many each has, and colours (F, 3 or 4) if some have one; NaN: none."""
 
 
 def _faces_of_one_size(values: Array, n_faces: int) -> Faces | None:
@@ -130,7 +145,7 @@ def _faces_of_one_size(values: Array, n_faces: int) -> Faces | None:
     return whole_numbers(rows[:, 1 : k + 1].ravel()), np.full(n_faces, k), rows[:, k + 1 :] if n_colors else None
 
 
-def _faces_of_lines(lines: list[bytes]) -> Faces:
+def _faces_of_lines(lines: list[bytes], source: InputFile) -> Faces:
     """Faces with a line for each."""
     rows = [line.split() for line in lines]
     counts = whole_numbers(numbers_of_text(b" ".join(row[0] for row in rows)))
@@ -138,9 +153,12 @@ def _faces_of_lines(lines: list[bytes]) -> Faces:
         raise MeshError("a face has fewer corners than it says")
     corners = [word for n, row in zip(counts.tolist(), rows, strict=True) for word in row[1 : n + 1]]
     colors = [row[n + 1 :] for n, row in zip(counts.tolist(), rows, strict=True)]
-    table: Array | None = None
-    if colors and len(colors[0]) in (3, 4) and all(len(color) == len(colors[0]) for color in colors):
-        table = numbers_of_text(b" ".join(word for color in colors for word in color)).reshape(len(colors), -1)
+    table = np.full((len(rows), 4), np.nan)
+    for n in (3, 4):
+        own = [i for i, color in enumerate(colors) if len(color) == n]
+        table[own, :n] = numbers_of_text(b" ".join(word for i in own for word in colors[i])).reshape(-1, n)
+    if any(len(color) not in (0, 3, 4) for color in colors):
+        source.notes.add("colours of faces by a map of colours not read")
     return whole_numbers(numbers_of_text(b" ".join(corners))), counts, table
 
 
@@ -162,10 +180,15 @@ def _faces_of_numbers(source: InputFile, values: list[float], n_faces: int) -> F
     return whole_numbers(np.array(corners, np.float64)), np.array(counts, np.int64), None
 
 
-def _bytes(values: Array) -> npt.NDArray[np.uint8]:
-    """SRGB bytes of colours of whole numbers of 0 to 255, or of 0 to 1."""
-    is_whole = bool((values == np.rint(values)).all() and values.max(initial=0) > 1)
-    return np.rint((np.nan_to_num(values) * (1 if is_whole else 255)).clip(0, 255)).astype(np.uint8)
+def _bytes(values: Array) -> npt.NDArray[np.uint8] | None:
+    """SRGB bytes of colours of whole numbers of 0 to 255, or of 0 to 1; 255 for NaN, None if all are."""
+    if np.isnan(values).all():
+        return None
+    scales = []
+    for part in (np.nan_to_num(values[:, :3]), np.nan_to_num(values[:, 3:])):  # opacity may be 0 to 1 behind bytes
+        scales.append(1 if (part == np.rint(part)).all() and part.max(initial=0) > 1 else 255)
+    scaled = values * np.repeat(scales, (3, 1))[: values.shape[1]]
+    return np.rint(np.nan_to_num(scaled, nan=255).clip(0, 255)).astype(np.uint8)
 
 
 def _meshes(
