@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, on
 
-from topleft import scenes
 from topleft._core import engine
 from topleft._meshes.model import mesh as mesh_module
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.mesh import Mesh, coincident
-from topleft._meshes.model.normals import angle_weighted_normals, face_normals
 
 TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
@@ -78,50 +76,15 @@ def test_bounds_without_triangles_is_refused():
         _ = Mesh(TRIANGLE, []).bounds
 
 
-def test_face_normals_of_a_degenerate_triangle_are_zero():
-    assert face_normals(np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]]), np.array([[0, 1, 2]])).tolist() == [[0, 0, 0]]
-
-
 def test_vertex_normals_of_the_mesh_win():
     normals = [[0.0, 0, 2], [0, 0, 1], [0, 0, 1]]
     assert Mesh(TRIANGLE, [[0, 1, 2]], normals).vertex_normals().tolist() == normals
-
-
-def test_vertex_normals_do_not_depend_on_how_a_face_is_cut():
-    # The cube with shared corners: at each corner three right angles, however many triangles share them.
-    vertices, triangles = scenes.shape("cube")
-    first, group = coincident(vertices)
-    normals = angle_weighted_normals(vertices[first], group[triangles].astype(np.int32))
-    assert normals == pytest.approx(vertices[first] / 3**0.5)
-
-
-def test_vertex_normals_of_a_fine_sphere_are_radial():
-    vertices, triangles = scenes.shape("sphere")
-    cosine = (Mesh(vertices, triangles).vertex_normals() * vertices).sum(axis=1)
-    assert cosine.min() > 0.99999
-
-
-def test_vertex_normals_of_an_unused_vertex_are_zero():
-    assert Mesh([*TRIANGLE, [5, 5, 5]], [[0, 1, 2]]).vertex_normals().tolist() == [[0, 0, 1]] * 3 + [[0, 0, 0]]
-
-
-def test_vertex_normals_weigh_by_angle():
-    # Two faces at right angles along x; the second is seen from vertex 0 under 45 degrees instead of 90.
-    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 1]]
-    normal = Mesh(vertices, [[0, 1, 2], [0, 3, 1]]).vertex_normals()[0]
-    # The faces' normals are (0, 0, 1) and (0, 1, 0).
-    assert normal == pytest.approx(np.array([0, 1, 2]) / 5**0.5)
 
 
 def test_coincident_groups_equal_rows_in_order_of_first_sight():
     first, group = coincident(np.array([[1.0, 2], [0, 0], [1, 2], [-0.0, 0]]))
     assert first.tolist() == [0, 1]
     assert group.tolist() == [0, 1, 0, 1]
-
-
-def test_coincident_compares_all_attributes():
-    first, _ = coincident(np.zeros((3, 3)), np.array([[1], [2], [1]], dtype=np.uint8))
-    assert first.tolist() == [0, 1]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

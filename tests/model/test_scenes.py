@@ -39,10 +39,6 @@ def test_random_triangles_lie_within_their_circle():
     assert (np.ptp(vertices[triangles][..., 2], axis=1) == 0).all()
 
 
-def test_random_triangles_another_seed_differs():
-    assert (scenes.random_triangles(5, 9)[0] != scenes.random_triangles(5, 9, seed=2)[0]).all()
-
-
 def test_planar_mesh_covers_the_frame_once():
     pytest.importorskip("scipy")
     vertices, triangles = scenes.planar_mesh(50, 64, 48)

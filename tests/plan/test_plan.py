@@ -331,11 +331,6 @@ def test_plan_of_a_mesh_fits_its_pictures_and_other_vertices():
     assert_same(frags.triangle, tl.rasterize_mesh(mesh, camera, (320, 240)).triangle)
 
 
-def test_plan_is_frozen():
-    with pytest.raises(AttributeError, match="cannot assign to field 'verb'"):
-        tl.plan(*boxes(8), SIZE).verb = "fill"
-
-
 def test_rows_tell_their_units_and_scenes():
     for row in fields(costs.Costs):
         assert row.metadata["prices"]

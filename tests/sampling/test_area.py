@@ -71,13 +71,13 @@ def at_limits(rng, n):
 
 
 KINDS = {
-    "strewn": lambda rng: strewn(rng, 700),
-    "coarse": lambda rng: [s for bits in range(5) for s in strewn(rng, 50, bits)],
-    "fine": lambda rng: [s for bits in (12, 16) for s in strewn(rng, 100, bits)],
-    "clipped": lambda rng: through_clip_planes(rng, 100),
-    "far": lambda rng: far_out(rng, 150),
-    "limits": lambda rng: at_limits(rng, 20),
-    "needles": lambda rng: [soup(c, (SIDE, SIDE)) for c in needles(rng, 100, SIDE).vertices.reshape(-1, 3, 2)],
+    "strewn": lambda rng: strewn(rng, 300),
+    "coarse": lambda rng: [s for bits in range(5) for s in strewn(rng, 25, bits)],
+    "fine": lambda rng: [s for bits in (12, 16) for s in strewn(rng, 50, bits)],
+    "clipped": lambda rng: through_clip_planes(rng, 50),
+    "far": lambda rng: far_out(rng, 75),
+    "limits": lambda rng: at_limits(rng, 8),
+    "needles": lambda rng: [soup(c, (SIDE, SIDE)) for c in needles(rng, 50, SIDE).vertices.reshape(-1, 3, 2)],
 }
 
 
@@ -104,11 +104,11 @@ def test_area_of_one_triangle_is_within_bound(kind, isa):
 def test_area_of_many_layers_is_within_bound(isa):
     """Past a sum of 1 float32 itself rounds by up to one unit in 2**24."""
     rng = np.random.default_rng(3)
-    scene = soup(rng.uniform(-9, 9, (1200, 2)) + [2, 1], (4, 2))
+    scene = soup(rng.uniform(-9, 9, (600, 2)) + [2, 1], (4, 2))
     exact, with_edges = cached_layers(scene.vertices.tobytes(), scene)
     with on(isa):
         got = draw(scene).astype(np.float64)
-    assert exact.max() > 50
+    assert exact.max() > 20
     assert (abs(got - exact) <= UNIT * (1.503 * with_edges + exact)).all()
 
 
@@ -250,16 +250,6 @@ def test_area_of_both_sides_is_the_whole(isa):
 # ---- the calls ------------------------------------------------------------------------------------------------------
 
 
-def test_area_of_degenerate_triangles_is_zero():
-    assert not draw(soup([[0, 0], [5, 5], [9, 9], [1, 1], [1, 1], [3, 0]], (8, 8))).any()
-
-
-def test_area_coverage_is_cut_off_at_one():
-    twice = Scene([[0, 0], [4, 0], [0, 4]], [[0, 1, 2], [2, 1, 0]], (3, 1))
-    assert draw(twice).tolist() == [[2, 2, 2]]
-    assert draw(twice, tl.coverage).tolist() == [[1, 1, 1]]
-
-
 @pytest.mark.parametrize("shape", [(0, 5), (5, 0), (3, 2)])
 def test_area_of_nothing_is_zero(shape):
     empty = tl.coverage(np.zeros((0, 2)), np.zeros((0, 3), int), shape, sampling="area")
@@ -322,26 +312,17 @@ def test_edges_across_the_right_border_need_no_wide_cells(isa):
             assert snapped.mesh.draw_area(pixels, engine.as_bytes(cells), 0, 30, False, True) == -1
 
 
-@pytest.mark.parametrize("far", [0, 1])
-def test_triangles_beside_the_window_add_nothing(far):
-    vertices, triangles, _ = scenes.random_triangles(300, 20, 60, 40)
-    beside = vertices[:, :2] + [-100 if far == 0 else 100, 0]
-    both = np.concatenate([vertices[:, :2], beside]), np.concatenate([triangles, triangles + len(vertices)])
-    alone = tl.overdraw(vertices[:, :2], triangles, (60, 40), sampling="area")
-    assert (tl.overdraw(*both, (60, 40), sampling="area") == alone).all()
-
-
 # ---- large shapes ---------------------------------------------------------------------------------------------------
 
 LARGE = np.array(
-    [[3.3, 2.1], [380.7, 30.2], [150.4, 91.9], [20, 70], [399, 1], [420, 97], [200.5, 40], [200.6, 41], [230, 40]]
+    [[3.3, 2.1], [180.7, 20.2], [70.4, 45.9], [10, 35], [199, 1], [210, 49], [100.5, 20], [100.6, 21], [115, 20]]
 )
 LARGE_TRIANGLES = np.arange(9).reshape(3, 3)
 
 
 @cache
 def areas_of_large_shapes():
-    return np.array(sum(ref.area(LARGE, [row], (411, 97)) for row in LARGE_TRIANGLES.tolist()), float)
+    return np.array(sum(ref.area(LARGE, [row], (205, 49)) for row in LARGE_TRIANGLES.tolist()), float)
 
 
 @ON_EACH_ISA
@@ -350,7 +331,7 @@ def areas_of_large_shapes():
 def test_large_shapes_have_the_same_areas_in_bands_of_any_height(isa, threads, verb):
     def draw_in(n_bytes):
         with choices.forced(area_bytes=n_bytes, area_triangle=0.0, near_pixels=0):
-            return verb(LARGE, LARGE_TRIANGLES, (411, 97), sampling="area", threads=threads)
+            return verb(LARGE, LARGE_TRIANGLES, (205, 49), sampling="area", threads=threads)
 
     with on(isa):
         whole = draw_in(1 << 30)

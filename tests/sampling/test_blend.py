@@ -7,18 +7,21 @@ import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
 from engine_cases import ON_EACH_ISA, THREADS, mixed, on
-from strategies import Scene, fan, jittered_grid, perspective, soup
+from strategies import Scene, perspective, soup
 
 import topleft as tl
 from topleft._core.raster.sampling import POSITIONS
-from topleft.methods import reference as exact
 from topleft.methods.reference import blend as ref
 from topleft.methods.reference.sampling import mean
 
 MODES = ("replace", "over", "add", "multiply", "max", "min")
 CHANNELS = (1, 2, 3, 4)
-#: Every mode with every number of channels that it takes.
-CASES = [(m, a, c) for m, a, c in product(MODES, ("straight", "premultiplied"), CHANNELS) if m != "over" or c in (2, 4)]
+#: Every mode with every number of channels that it takes; where none is an alpha, its kind says nothing.
+CASES = [
+    (mode, alpha, n)
+    for mode, alpha, n in product(MODES, ("straight", "premultiplied"), CHANNELS)
+    if n in (2, 4) or (mode != "over" and alpha == "straight")
+]
 
 
 def random_colors(rng, shape, dtype, alpha):
@@ -272,30 +275,6 @@ def test_blend_is_in_painters_order(isa):
 
 
 @ON_EACH_ISA
-def test_blend_of_a_mesh_at_half_alpha_shows_no_seams(isa):
-    rng = np.random.default_rng(0)
-    for scene in [fan(rng) for _ in range(5)] + [jittered_grid(rng, 40, 90) for _ in range(3)]:
-        covered = exact.coverage(*scene.arrays) if len(scene.triangles) < 400 else np.ones(scene.size[::-1], bool)
-        for color in np.array([[200, 100, 50, 128]], np.uint8), np.array([[0.7, 0.4, 0.2, 0.5]], np.float32):
-            ground = 255 if color.dtype == np.uint8 else 1
-            with on(isa):
-                got = draw(
-                    scene, np.repeat(color, len(scene.triangles), 0), per="triangle", blend="over", background=ground
-                )
-                once = tl.fill(
-                    [[-9, -9], [500, -9], [-9, 500]],
-                    [[0, 1, 2]],
-                    color,
-                    (1, 1),
-                    per="triangle",
-                    blend="over",
-                    background=ground,
-                )
-            assert (got[covered] == once[0, 0]).all()
-            assert (got[~covered] == ground).all()
-
-
-@ON_EACH_ISA
 def test_blend_by_area_of_vertex_colours_that_agree_is_flat(isa):
     """Also where a clip plane has cut the triangles, and pixel centres lie beside the pieces."""
     for scene in small_scenes():
@@ -330,27 +309,14 @@ def test_blend_by_area_takes_weights_below_zero_as_zero(isa):
     assert abs(int(got[0, 0]) - color * area) < 3
 
 
-def test_blend_by_area_shows_seams_that_the_sum_of_areas_does_not():
-    """Two halves of a pixel over black leave a quarter of it: 1 - (1 - a) * (1 - b) is below a + b."""
-    rng = np.random.default_rng(0)
-    mesh = jittered_grid(rng, 40, 90)
-    white = np.full((len(mesh.triangles), 3), 255, np.uint8)
-    got = draw(mesh, white, per="triangle", sampling="area")
-    assert (tl.overdraw(*mesh.arrays, sampling="area") == 1).all()
-    assert (got < 255).any(axis=-1).mean() > 0.25
-    assert got.min() < 192  # where triangles share a pixel evenly: 3 / 4 of 255 and less
-    assert (draw(mesh, white, per="triangle") == 255).all()
-
-
 # ---- the calls ------------------------------------------------------------------------------------------------------
 
 ONE = ([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]])
 
 
-@ON_EACH_ISA
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
-def test_blend_of_samples_is_the_mean_of_pictures_by_samples(mode, alpha, n_channels, dtype, isa):
+@lru_cache(None)
+def mean_by_samples(mode, alpha, n_channels, dtype):
+    """A scene to fill, and the mean of its pictures, each with the vertices moved to one of four samples."""
     rng = np.random.default_rng(n_channels)
     scene = mixed(rng, 90, (41, 13))
     vertices = np.round(scene.vertices[:, :2] * 256) / 256  # on the grid, so that moving them moves no corner
@@ -363,37 +329,27 @@ def test_blend_of_samples_is_the_mean_of_pictures_by_samples(mode, alpha, n_chan
     is_straight = n_channels in (2, 4) and alpha == "straight" and mode in ("over", "replace")
     samples = np.moveaxis(pictures, 0, 2)
     expected = [[mean(pixel, is_straight=is_straight) for pixel in row] for row in samples]
+    return (vertices, scene.triangles, colors, scene.size), options, expected
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+def test_blend_of_samples_is_the_mean_of_pictures_by_samples(mode, alpha, n_channels, dtype, isa):
+    arrays, options, expected = mean_by_samples(mode, alpha, n_channels, dtype)
     for threads in (1, 3):
         with on(isa):
-            view = {"sampling": "msaa4", "threads": threads}
-            got = tl.fill(vertices, scene.triangles, colors, scene.size, blend=mode, **options, **view)
+            got = tl.fill(*arrays, blend=mode, **options, sampling="msaa4", threads=threads)
         if dtype == np.uint8:
             assert_same(got, np.array(expected, np.uint8))
         else:
             assert abs(got - np.array(expected)).max() < 2**-22  # float64 sums rounded once, of numbers below 4
 
 
-def test_blend_of_samples_at_half_alpha_shows_no_seams():
-    scene = fan(np.random.default_rng(3), 40, 60)
-    colors = np.full((len(scene.triangles), 2), (255, 128), np.uint8)
-    view = {"blend": "over", "background": (0, 255), "per": "triangle", "sampling": "msaa8"}
-    got = tl.fill(scene.vertices[:, :2], scene.triangles, colors, scene.size, **view)
-    whole = tl.coverage(scene.vertices[:, :2], scene.triangles, scene.size, sampling="msaa8") == 1
-    assert whole.sum() > 500
-    assert (got[whole] == (128, 255)).all()
-
-
 def test_blend_goes_to_out_of_any_layout():
     out = np.full((6, 4, 3), 10, np.uint8)[::2]
     assert tl.fill(*ONE, [[1, 2, 3]], (4, 3), blend="add", out=out) is out
     assert out[:, :, 2].tolist() == [[13, 13, 13, 10], [13, 13, 10, 10], [13, 10, 10, 10]]
-
-
-def test_blend_rasterizer_equals_the_verb():
-    colors = crowd_colors(np.uint8, 3)
-    scene, _ = crowd()
-    got = tl.Rasterizer(scene.size).fill(*scene.arrays[:2], colors, per="triangle", blend="multiply", background=255)
-    assert_same(got, crowd_picture(colors, blend="multiply", background=255))
 
 
 @pytest.mark.parametrize("size", [(0, 5), (5, 0), (3, 2)])

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, mixed, on, sharing
+from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, sharing
 from pages import before_a_page, behind_a_page
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
 
@@ -18,6 +18,7 @@ from topleft._core.raster.sampling import POSITIONS
 from topleft._core.raster.view import View
 from topleft.methods.reference import sampling as ref
 
+sample_coverage, sample_ids = kept(ref.sample_coverage), kept(ref.sample_ids)
 COUNTS = (2, 4, 8, 16)
 SCENES = {name: f for name, f in (PIXEL_SCENES | CLIP_SCENES).items() if name not in ("far_away", "far_integers")}
 
@@ -51,7 +52,7 @@ def test_coverage_is_the_share_of_samples_of_the_reference(isa, name):
     scene = SCENES[name](np.random.default_rng(21))
     if name == "guard_band":
         scene.view["subpixel_bits"] = 8
-    expected = ref.sample_coverage(*scene.arrays, 4, **scene.view)
+    expected = sample_coverage(*scene.arrays, 4, **scene.view)
     with on(isa):
         for method in ("auto", "edge"):
             assert_same(draw(scene, 4, method=method), shares(expected))
@@ -67,7 +68,7 @@ def test_coverage_each_precision_is_that_of_the_reference(isa, n, bits):
         for make in (few_bits, on_centres, slivers):
             scene = make(rng, 4)
             view = scene.view | {"subpixel_bits": bits, "origin": (2, 3)}
-            assert_same(draw(scene, n, **view), shares(ref.sample_coverage(*scene.arrays, n, **view)))
+            assert_same(draw(scene, n, **view), shares(sample_coverage(*scene.arrays, n, **view)))
 
 
 @ON_EACH_ISA
@@ -85,19 +86,6 @@ def test_coverage_all_sizes_is_that_of_centres_when_vertices_move(isa, bits):
             assert_same(draw(scene, n, tl.overdraw), expected)
 
 
-def test_coverage_window_is_the_crop_of_the_whole():
-    whole = mixed(np.random.default_rng(3), 200, (120, 90))
-    part = Scene(whole.vertices, whole.triangles, (50, 40), whole.view | {"origin": (33, 21)})
-    for n in COUNTS:
-        assert_same(draw(part, n), draw(whole, n)[21:61, 33:83])
-
-
-def test_coverage_quad_is_1_and_half_of_it_half():
-    quad = [[0, 0], [2, 0], [2, 2], [0, 2]]
-    assert tl.coverage(quad, [[0, 1, 2], [0, 2, 3]], (3, 2), sampling="msaa16").tolist() == [[1, 1, 0]] * 2
-    assert tl.coverage([[0, 0], [0.5, 0], [0, 9]], [[0, 1, 2]], (1, 1), sampling="msaa8").tolist() == [[0.5]]
-
-
 def test_coverage_coarse_grid_beyond_the_range_of_the_samples_is_an_error():
     far = [[0, 0], [2.0**59, 0], [0, 2.0**59]]
     assert tl.coverage(far, [[0, 1, 2]], (1, 1), subpixel_bits=0).all()
@@ -110,7 +98,7 @@ def test_coverage_coarse_grid_takes_vertices_beyond_the_narrow_range(isa):
     far = [[-(2**29) + 3, -5], [2**29 - 1, 4], [7, 2**40]]
     with on(isa):
         got = tl.coverage(far, [[0, 1, 2]], (9, 9), subpixel_bits=0, sampling="msaa8")
-    assert_same(got, shares(ref.sample_coverage(far, [[0, 1, 2]], (9, 9), 8, subpixel_bits=0)))
+    assert_same(got, shares(sample_coverage(far, [[0, 1, 2]], (9, 9), 8, subpixel_bits=0)))
 
 
 # ---- ids and depth --------------------------------------------------------------------------------------------------
@@ -132,7 +120,7 @@ def test_ids_are_those_of_the_reference(isa, name):
     if name in PIXEL_SCENES:
         scene, tests = with_depth(scene, rng, flat=True), (None, "less", "greater")
     for depth_test in tests:
-        expected = ref.sample_ids(*scene.arrays, 2, depth_test=depth_test, **scene.view)
+        expected = sample_ids(*scene.arrays, 2, depth_test=depth_test, **scene.view)
         for method in ("auto", "scanline"):
             with on(isa):
                 frags = draw(scene, 2, tl.rasterize, depth_test=depth_test, method=method)
@@ -163,7 +151,7 @@ def test_ids_of_cut_triangles_on_a_coarse_grid_are_those_of_the_reference(bits):
     scene.view["subpixel_bits"] = bits
     frags = draw(scene, 4, tl.rasterize)
     assert (frags.samples_triangle >= 0).any()
-    assert_same(frags.samples_triangle, ref.sample_ids(*scene.arrays, 4, depth_test="less", **scene.view))
+    assert_same(frags.samples_triangle, sample_ids(*scene.arrays, 4, depth_test="less", **scene.view))
 
 
 def test_fragments_of_cut_triangles_keep_their_attributes():
@@ -217,7 +205,7 @@ def split_ids(vertices, triangles, size, memory=FRESH, depth_test="less", backgr
         return draw_fragments(memory, vertices, triangles, view, options)
 
 
-def kept(frags):
+def listed(frags):
     """Pixels that are listed, (H, W), and ids and depths of samples (H, W, S) from the lists; other depths are NaN."""
     n, split = len(frags._split.drawn.positions), frags._split.split
     is_listed = np.zeros(frags.id.shape, bool)
@@ -234,7 +222,7 @@ def kept(frags):
 def check_kept(frags):
     """The pixels listed are those whose samples differ, and all samples are those of the planes."""
     before = frags.id, frags.depth
-    is_listed, ids, depth = kept(frags)
+    is_listed, ids, depth = listed(frags)
     spread = frags.samples_triangle  # from the lists: planes are drawn when depths are asked for
     assert frags._split is not None
     planes = frags.samples_depth, frags.samples_triangle
@@ -292,7 +280,7 @@ def test_lists_of_every_pixel_stay_in_their_room(isa, guard, width):
     rasterizer._lent.memory = Guarded(guard)
     with on(isa):
         frags = split_ids(corners, triangles, (width, 67), rasterizer._lent.memory, sampling="msaa8", threads=3)
-        assert kept(frags)[0].all()
+        assert listed(frags)[0].all()
         check_kept(frags)
     assert "split columns of samples" in rasterizer._lent.memory.names
 
