@@ -92,13 +92,6 @@ def test_fill_out_without_background_is_drawn_over():
     assert out[:, :, 0].tolist() == [[1, 1, 1, 1], [1, 1, 1, 5], [1, 1, 5, 5], [1, 5, 5, 5]]
 
 
-def test_rasterizer_draws_classics_too():
-    vertices, triangles = soup(5)
-    rasterizer = tl.Rasterizer((24, 20))
-    expected = tl.coverage(vertices, triangles, (24, 20), method="lerp_scanline")
-    assert np.array_equal(rasterizer.coverage(vertices, triangles, method="lerp_scanline"), expected)
-
-
 def test_depth_column_is_not_looked_at():
     vertices, triangles = soup(6)
     deep = np.column_stack([vertices, np.full(len(vertices), np.nan)])

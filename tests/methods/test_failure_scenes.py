@@ -67,17 +67,3 @@ def test_failure_scenes_each_fallible_method_is_there():
     found = {got.method for scene in FAILURE_SCENES.values() for got in scene.got}
     fills = [name for name in CLASSICS if not name.endswith("/wireframe")]
     assert found >= {*fills, *METHODS}  # production: at 8 bits or less, where more bits are right
-
-
-def test_failure_scenes_exact_methods_gaps_and_overdraw_are_what_their_snap_made_of_the_mesh():
-    exact = [name for name, method in {**METHODS, **CLASSICS}.items()
-             if method.claims.exact and not method.claims.overdraws_shared_edges]  # fmt: skip
-    for scene, got in ((s, g) for s in FAILURE_SCENES.values() for g in s.got if s.kind != "wrong"):
-        if got.method not in exact:
-            continue
-        is_whole = {**METHODS, **CLASSICS}[got.method].claims.integer_vertices
-        vertices, triangles = scene.shape()
-        vertices = np.trunc(vertices) + 0.5 if is_whole else vertices
-        bits = 8 if is_whole else got.subpixel_bits
-        snapped = reference.overdraw(vertices, triangles, scene.size, origin=scene.origin, subpixel_bits=bits)
-        assert snapped.tolist() == picture(got.rows).tolist()

@@ -1,13 +1,12 @@
 """Masks, labels and squares of polygons are those of the exact reference, on each instruction set."""
 
 from fractions import Fraction
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from engine_cases import ON_EACH_ISA, kept, on
 from hypothesis import given, settings
-from polygon_cases import SIZE, cells, square, star, wild_polygon, wild_seeds
+from polygon_cases import SIZE, star, wild_polygon, wild_seeds
 
 import topleft as tl
 from topleft._core.base.options import Sampling
@@ -39,7 +38,7 @@ def test_mask_of_wild_rings_equals_reference(isa, rule, seed):
 
 
 @ON_EACH_RULE
-@settings(max_examples=120)
+@settings(max_examples=60)
 @given(wild_seeds)
 def test_squares_of_wild_rings_equal_reference(rule, seed):
     polygon = wild_polygon(np.random.default_rng(seed))
@@ -66,7 +65,7 @@ def test_squares_of_runs_that_end_near_whole_words_equal_reference(isa, left, ri
 
 @ON_EACH_ISA
 @ON_EACH_RULE
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(wild_seeds)
 def test_labels_of_wild_polygons_are_the_last_masks(isa, rule, seed):
     rng = np.random.default_rng(seed)
@@ -155,21 +154,12 @@ def test_threads_and_instruction_sets_change_no_bit(isa, sampling):
             assert (one == tl.polygons(drawn[0], (70, 50), sampling=sampling, threads=1)).all()
 
 
-def test_cells_that_tile_the_frame_own_each_pixel_once():
-    size = 300, 200
-    points, rings, owners = cells(400, size)
-    labels = tl.polygons((points, rings, owners), size, values="index")
-    assert (labels >= 0).all()
-    counts = sum(tl.polygons(points[a:b], size).astype(int) for a, b in pairwise(rings))
-    assert (counts == 1).all()
-
-
 @ON_EACH_ISA
 @ON_EACH_RULE
-def test_a_million_corners_equal_the_sum_of_parities(isa, rule):
+def test_300_000_corners_equal_the_sum_of_parities(isa, rule):
     """Against crossings of whole rows in float64, which is exact for these."""
     side = 512
-    ring = np.round(256 * star(1_000_000, side, 3.0, 2e-5)) / 256
+    ring = np.round(256 * star(300_000, side, 3.0, 2e-5)) / 256
     ends = np.roll(ring, -1, axis=0)
     with on(isa):
         mask = tl.polygons(ring, (side, side), rule=rule)
@@ -202,24 +192,3 @@ def test_polygons_of_many_corners_among_small_ones_keep_their_order():
         for threads in (1, 3):
             labels = tl.polygons([[r] for r in rings], (side, side), rule=rule, values="index", threads=threads)
             assert (labels == expected).all()
-
-
-def test_holes_may_run_either_way():
-    for turn in (1, -1):
-        rings = [square(0, 0, 6, 4), square(1, 1, 4, 3, turn)]
-        for sampling in ("center", "area", "outer", "inner", "msaa4"):
-            assert not tl.polygons(rings, (6, 4), sampling=sampling)[1:3, 1:4].any()
-
-
-def test_hole_of_the_same_turn_is_filled_by_the_nonzero_rule():
-    for sampling in ("center", "area", "outer", "inner"):
-        assert tl.polygons([square(0, 0, 6, 4), square(1, 1, 4, 3)], (6, 4), rule="nonzero", sampling=sampling).all()
-        turned = tl.polygons([square(0, 0, 6, 4), square(1, 1, 4, 3, -1)], (6, 4), rule="nonzero", sampling=sampling)
-        assert not turned[1:3, 1:4].any()
-
-
-def test_outer_burns_what_all_touched_should():
-    """GDAL issue 8918: a polygon that only touches the border of a pixel does not meet it."""
-    assert tl.polygons(square(1, 1, 3, 2), (4, 3), sampling="outer").sum() == 2
-    assert tl.polygons(square(1, 1, 3.125, 2.125), (4, 3), sampling="outer").sum() == 6
-    assert tl.polygons([(0.25, 0.25), (0.5, 0.25), (0.5, 0.5)], (2, 2), sampling="outer").sum() == 1

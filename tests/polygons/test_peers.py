@@ -1,40 +1,12 @@
 """Polygons beside what other libraries say of the same points: where they differ, and why."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from polygon_cases import cells, star, wild_polygon
+from polygon_cases import star, wild_polygon
 
 import topleft as tl
 
 SIDE = 40
-
-
-def centers(side=SIDE):
-    x, y = np.meshgrid(np.arange(side) + 0.5, np.arange(side) + 0.5)
-    return np.stack([x.ravel(), y.ravel()], 1)
-
-
-def rings(n=60):
-    """Rings with no point at the height of a centre, and no centre on an edge (almost surely)."""
-    for seed in range(n):
-        ring = np.round(256 * star(5 + 3 * seed, SIDE, 3.0, 0.2 if seed % 2 else 0.0, seed)) / 256
-        yield ring + (np.mod(ring, 1) == 0.5) / 256
-
-
-def test_masks_are_those_of_matplotlib():
-    path = pytest.importorskip("matplotlib.path")
-    for ring in rings():
-        inside = path.Path(np.vstack([ring, ring[:1]]), closed=True).contains_points(centers())  # even-odd
-        assert (tl.polygons(ring, (SIDE, SIDE)).ravel() == inside).all()
-
-
-def test_masks_are_those_of_skimage():
-    measure = pytest.importorskip("skimage.measure")
-    for ring in rings():
-        inside = measure.points_in_poly(centers(), ring)
-        assert (tl.polygons(ring, (SIDE, SIDE)).ravel() == inside).all()
 
 
 def test_masks_and_areas_are_those_of_shapely():
@@ -63,43 +35,6 @@ def test_area_of_crossing_rings_is_that_of_shapely_repaired():
         expected = odd.intersection(shapely.box(0, 0, SIDE, SIDE)).area
         drawn = tl.polygons(polygon, (SIDE, SIDE), sampling="area").sum(dtype=float)
         assert drawn == pytest.approx(expected, abs=1e-3)
-
-
-def test_labels_of_rasterio_differ_on_edges_alone():
-    """GDAL gives the centre on an edge to another side here and there; where none lies on one, nothing differs."""
-    features = pytest.importorskip("rasterio.features")
-    shapely = pytest.importorskip("shapely")
-    affine = pytest.importorskip("affine")
-    points, starts, _ = cells(60, (SIDE, SIDE))
-    shapes = [shapely.Polygon(points[a:b]) for a, b in pairwise(starts)]
-    labels = tl.polygons(shapes, (SIDE, SIDE), values="index")
-    pairs = [(shape, i) for i, shape in enumerate(shapes)]
-    burnt = features.rasterize(pairs, (SIDE, SIDE), fill=-1, transform=affine.Affine.identity(), dtype="int32")
-    borders = shapely.union_all([shape.boundary for shape in shapes])
-    at = centers()[(labels != burnt).ravel()]
-    assert (shapely.distance(borders, shapely.points(at)) < 1e-9).all()
-
-
-def test_all_touched_of_rasterio_burns_more_than_outer():
-    """It also burns squares that are only touched, and all that the bounds of an edge reach: GDAL issue 8918."""
-    features = pytest.importorskip("rasterio.features")
-    shapely = pytest.importorskip("shapely")
-    affine = pytest.importorskip("affine")
-    shape = shapely.box(2, 2, 5, 4)
-    burnt = features.rasterize([shape], (8, 8), transform=affine.Affine.identity(), all_touched=True)
-    assert tl.polygons(shape, (8, 8), sampling="outer").sum() == 6
-    assert burnt.sum() >= 6
-
-
-def test_masks_of_pycocotools_are_coarser():
-    """It draws lines on a grid of 1/5 pixel: within a pixel of the border it is off, no farther."""
-    mask = pytest.importorskip("pycocotools.mask")
-    shapely = pytest.importorskip("shapely")
-    ring = np.round(256 * star(40, SIDE, 0.5)) / 256
-    theirs = mask.decode(mask.merge(mask.frPyObjects([ring.ravel().tolist()], SIDE, SIDE))).astype(bool)
-    ours = tl.polygons([ring.ravel().tolist()], (SIDE, SIDE))
-    at = centers()[(ours != theirs).ravel()]
-    assert (shapely.distance(shapely.Polygon(ring).boundary, shapely.points(at)) < 1).all()
 
 
 def random_polygons(shapely, n=60):

@@ -1,6 +1,5 @@
 """`to_rle`: counts down the columns, as pycocotools writes and reads them."""
 
-import json
 from itertools import groupby
 
 import numpy as np
@@ -116,11 +115,6 @@ def test_masks_of_bytes_and_strided_masks_are_the_same():
     mask = masks_of((33, 65))[6]
     assert tl.to_rle(mask.astype(np.uint8)) == tl.to_rle(np.asfortranarray(mask)) == tl.to_rle(mask)
     assert tl.to_rle(mask[::2, ::-3]) == tl.to_rle(mask[::2, ::-3].copy())
-
-
-def test_a_dict_goes_through_json():
-    found = tl.to_rle(masks_of((9, 9))[6])
-    assert json.loads(json.dumps(found)) == found
 
 
 @pytest.mark.parametrize(
