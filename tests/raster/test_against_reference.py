@@ -10,16 +10,13 @@ from hypothesis import strategies as st
 from strategies import (
     CLIP_SCENES,
     PIXEL_SCENES,
-    Scene,
     clip_scenes,
     fan,
-    floor,
     jittered_grid,
     partner,
     pixel_scenes,
     soup,
     sphere_round_the_eye,
-    t_junctions,
     with_depth,
 )
 
@@ -43,11 +40,11 @@ def scenes(make, n):
 
 @EITHER
 def test_overdraw_adversarial_scene_equals_reference(make):
-    for scene, _ in scenes(make, 15):
+    for scene, _ in scenes(make, 6):
         comparing.check_overdraw(scene)
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(pixel_scenes() | clip_scenes())
 def test_overdraw_any_scene_equals_reference(scene):
     comparing.check_overdraw(scene)
@@ -82,37 +79,13 @@ def test_overdraw_each_number_of_bits_equals_reference(bits):
 
 def test_overdraw_meshes_that_fill_the_frame_cover_each_sample_once():
     for make in (jittered_grid, sphere_round_the_eye):
-        for scene, _ in scenes(make, 24):
+        for scene, _ in scenes(make, 8):
             assert (comparing.check_overdraw(scene) == 1).all()
-
-
-def test_overdraw_closed_fan_covers_no_sample_twice():
-    for scene, _ in scenes(fan, 18):
-        counts = comparing.check_overdraw(scene)
-        assert counts.max() == 1
-        hub, ring = scene.vertices[-1], scene.vertices[:-1]
-        rows, columns = np.indices(counts.shape) + 0.5
-        distance = np.hypot(columns - hub[0], rows - hub[1])
-        assert counts[distance < 0.99 * np.hypot(*(ring - hub).T).min()].all()
-
-
-def test_overdraw_floor_through_the_near_plane_covers_each_sample_once():
-    for scene, _ in scenes(floor, 18):
-        counts = comparing.check_overdraw(scene)
-        assert counts.max() == 1
-        assert (counts[len(counts) // 2 + 1 :] == 1).all()  # below the horizon
-
-
-def test_overdraw_t_junctions_on_the_grid_leave_no_gap():
-    for scene, _ in scenes(t_junctions, 24):
-        counts = comparing.check_overdraw(scene)
-        if (scene.vertices * 256 % 1 == 0).all():
-            assert counts.max() == 1
 
 
 @pytest.mark.parametrize("make", [jittered_grid, fan], ids=lambda f: f.__name__)
 def test_overdraw_large_picture_equals_int64_reference(make):
-    scene = make(np.random.default_rng(5), 400 if make is fan else 60, 1400)
+    scene = make(np.random.default_rng(5), 200 if make is fan else 30, 700)
     counts, ids = comparing.overdraw_int64(scene)
     for method in comparing.METHODS:
         comparing.assert_exact(tl.overdraw(*scene.arrays, method=method), counts)
@@ -143,20 +116,20 @@ def test_reference_and_int64_reference_agree():
 
 @PIXEL
 def test_rasterize_painters_order_equals_reference(make):
-    for scene, _ in scenes(make, 6):
+    for scene, _ in scenes(make, 3):
         comparing.check_painters_ids(scene)
 
 
 @DEPTH_TEST
 @PIXEL
 def test_rasterize_flat_depths_with_ties_equal_reference(make, depth_test):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 2):
         comparing.check_ids(with_depth(scene, rng, flat=True), depth_test)
 
 
 @PIXEL
 def test_rasterize_sloping_depths_within_bound(make):
-    for scene, rng in scenes(make, 3):
+    for scene, rng in scenes(make, 2):
         comparing.check_fragments(with_depth(scene, rng))
 
 
@@ -178,7 +151,7 @@ def test_rasterize_far_slivers_within_bound():
 
 @CLIP
 def test_rasterize_clip_space_depths_within_bound(make):
-    for scene, _ in scenes(make, 5):
+    for scene, _ in scenes(make, 3):
         comparing.check_fragments(scene)
 
 
@@ -187,26 +160,12 @@ def test_rasterize_any_scene_within_bound(scene):
     comparing.check_fragments(scene)
 
 
-@pytest.mark.parametrize("depth_test", ["less", "greater"])
-def test_rasterize_each_triangle_alone_explains_the_whole(depth_test):
-    for scene, rng in scenes(jittered_grid, 4):
-        scene = with_depth(scene, rng)
-        alone = [
-            tl.rasterize(scene.vertices, t[None], scene.size, depth_test=depth_test).depth for t in scene.triangles
-        ]
-        best = np.min(alone, 0) if depth_test == "less" else np.max(alone, 0)
-        whole = tl.rasterize(*scene.arrays, depth_test=depth_test)
-        comparing.assert_same(whole.depth, best)
-        first = np.where(np.isfinite(best), np.argmax(alone == best, axis=0), -1).astype(np.int32)
-        comparing.assert_same(whole.triangle, first)
-
-
 # ---- attributes -----------------------------------------------------------------------------------------------------
 
 
 @EITHER
 def test_interpolate_within_bound(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 2):
         comparing.check_attributes(scene, rng.uniform(-100, 100, (len(scene.vertices), 2)).astype(np.float32))
 
 
@@ -221,14 +180,14 @@ def test_interpolate_any_scene_within_bound(scene, seed):
 
 @EITHER
 def test_fill_flat_equals_reference(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 2):
         colors = rng.integers(0, 256, (len(scene.triangles), rng.integers(1, 5)), np.uint8)
         comparing.check_fill_uint8(scene, colors, "triangle")
 
 
 @PIXEL
 def test_fill_gouraud_uint8_equals_reference(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 2):
         colors = rng.integers(0, 256, (len(scene.vertices), rng.integers(1, 5)), np.uint8)
         comparing.check_fill_uint8(scene, colors, "vertex")
 
@@ -262,21 +221,14 @@ def test_fill_any_gouraud_uint8_equals_reference(scene, seed, n_channels):
 
 @EITHER
 def test_fill_gouraud_float32_within_bound(make):
-    for scene, rng in scenes(make, 4):
+    for scene, rng in scenes(make, 2):
         comparing.check_fill_float32(scene, rng.uniform(-3, 3, (len(scene.vertices), 3)).astype(np.float32))
 
 
 @CLIP
 def test_fill_gouraud_uint8_clip_space_but_for_ties_equals_reference(make):
-    for scene, rng in scenes(make, 5):
+    for scene, rng in scenes(make, 2):
         comparing.check_fill_uint8_cut(scene, rng.integers(0, 256, (len(scene.vertices), 3), np.uint8))
-
-
-def test_fill_float32_flat_colours_are_copied():
-    scene = jittered_grid(np.random.default_rng(3))
-    colors = np.random.default_rng(4).standard_normal((len(scene.triangles), 3)).astype(np.float32)
-    ids = comparing.ref.ids(*scene.arrays)
-    comparing.assert_exact(tl.fill(scene.vertices, scene.triangles, colors, scene.size, per="triangle"), colors[ids])
 
 
 # ---- nothing to see -------------------------------------------------------------------------------------------------
@@ -289,8 +241,3 @@ def test_rasterize_all_behind_the_eye_is_nothing(w):
     scene = soup(positions, (9, 7), near_clip=False, far_clip=False)
     assert not comparing.check_overdraw(scene).any()
     assert (tl.rasterize(*scene.arrays, **scene.view).triangle == -1).all()
-
-
-def test_overdraw_no_triangles_is_empty():
-    scene = Scene(np.zeros((3, 2)), np.zeros((0, 3), np.int64), (4, 3))
-    assert not comparing.check_overdraw(scene).any()

@@ -101,11 +101,6 @@ def test_unaligned_out_of_a_classic_is_filled_through_an_aligned_canvas(monkeypa
     np.testing.assert_array_equal(counts, tl.overdraw(SQUARE, LEFT, SIZE, method="zigzag"))
 
 
-def test_overdraw_out_is_cleared_first():
-    out = np.full((4, 4), 9, np.int32)
-    np.testing.assert_array_equal(tl.overdraw(SQUARE, LEFT * 2, SIZE, out=out), 2 * LEFT_MASK)
-
-
 @pytest.mark.parametrize("n_channels", [None, 1, 2, 3, 4])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_flat_fill_draws_over_out_and_shows_it_elsewhere(n_channels, dtype):
@@ -176,12 +171,6 @@ def test_large_memory_is_aligned_to_huge_pages(n_bytes):
     block = allocate(n_bytes)
     assert block.size >= n_bytes
     assert n_bytes < 4 << 20 or block.ctypes.data % (2 << 20) == 0
-
-
-def test_module_level_results_stay_valid():
-    first = tl.coverage(SQUARE, LEFT, SIZE)
-    assert not np.shares_memory(first, tl.coverage(SQUARE, HALVES, SIZE))
-    np.testing.assert_array_equal(first, LEFT_MASK)
 
 
 def test_attributes_survive_a_change_of_the_inputs():

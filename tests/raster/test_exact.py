@@ -126,15 +126,6 @@ def test_weights_and_values_of_hostile_floats_are_those_of_the_reference(scene, 
     assert largest_error(frags.interpolate(values), exact) <= 2.0**-24
 
 
-def test_mesh_with_a_camera_is_drawn_without_a_snap():
-    vertices, triangles, *_ = tl.scenes.icosphere(3)
-    mesh = tl.Mesh(vertices, triangles)
-    frags = tl.rasterize_mesh(mesh, None, (64, 48), **EXACT)
-    snapped = tl.rasterize_mesh(mesh, None, (64, 48))
-    assert (frags.triangle != snapped.triangle).mean() < 0.02
-    assert frags.mask.any()
-
-
 # ---- named scenes ---------------------------------------------------------------------------------------------------
 
 
@@ -325,15 +316,6 @@ def test_transform_that_rounds_nothing_changes_no_bit(isa, size):
         found = tl.rasterize(clip, triangles, size, transform=np.eye(4), **EXACT)
     assert (found.triangle == expected.triangle).all()
     assert (found.depth == expected.depth).all()
-
-
-def test_fill_colours_the_triangle_on_top():
-    scene = mixed_scene(np.random.default_rng(6), 300)
-    vertices, triangles = scene.vertices[:, :2], scene.triangles
-    colors = np.random.default_rng(1).integers(1, 255, (len(triangles), 3), np.uint8)
-    ids = tl.rasterize(vertices, triangles, scene.size, **EXACT).triangle
-    filled = tl.fill(vertices, triangles, colors, scene.size, per="triangle", **EXACT)
-    assert (filled == np.where(ids[..., None] < 0, 0, colors[ids])).all()
 
 
 def test_samples_of_fill_and_rasterize_are_those_of_coverage():

@@ -244,13 +244,6 @@ def test_backs_of_single_sided_materials_are_left_out_by_the_exact_turn():
     assert tl.rasterize_mesh(mesh, inside, (64, 48), **EXACT).mask.all()
 
 
-def test_ways_and_distances_of_the_points_seen_are_those_of_the_snapped_picture():
-    mesh = ball()
-    exact, snapped = (tl.rasterize_mesh(mesh, CAMERA, (64, 48), subpixel_bits=bits) for bits in ("exact", 16))
-    same = exact.mask & (exact.triangle == snapped.triangle)
-    assert abs(exact.distance(CAMERA)[same] - snapped.distance(CAMERA)[same]).max() < 1e-4
-
-
 # ---- grids ----------------------------------------------------------------------------------------------------------
 
 

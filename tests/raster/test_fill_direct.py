@@ -29,12 +29,6 @@ def test_fill_of_few_triangles_shows_the_later_one(n, channels):
     assert (ids >= 0).any()
 
 
-def test_fill_of_few_triangles_one_number_a_pixel():
-    vertices, triangles, colors = few_triangles(5, 1)
-    picture = tl.fill(vertices, triangles, colors[:, 0], SIZE, background=7)
-    assert (picture == tl.fill(vertices, triangles, colors, SIZE, background=7)[..., 0]).all()
-
-
 @pytest.mark.parametrize("threads", [1, 3])
 def test_fill_of_few_triangles_keeps_out_where_nothing_is(threads):
     vertices, triangles, colors = few_triangles(9, 4)
@@ -43,27 +37,6 @@ def test_fill_of_few_triangles_keeps_out_where_nothing_is(threads):
     expected = np.where((ids < 0)[..., None], out, colors[ids])
     tl.fill(vertices, triangles, colors, SIZE, per="triangle", out=out, threads=threads)
     assert (out == expected).all()
-
-
-@pytest.mark.parametrize("method", ["edge", "scanline"])
-def test_fill_of_few_triangles_every_method_gives_the_same(method):
-    scene = few_triangles(20, 4)
-    assert (tl.fill(*scene, SIZE, method=method) == tl.fill(*scene, SIZE)).all()
-
-
-def test_fill_of_few_triangles_windows_are_crops():
-    vertices, triangles, colors = few_triangles(20, 4)
-    whole = tl.fill(vertices, triangles, colors, SIZE, background=3)
-    window = tl.fill(vertices, triangles, colors, (101, 97), background=3, origin=(77, 133))
-    assert (window == whole[133:230, 77:178]).all()
-
-
-def test_fill_of_few_triangles_into_every_second_column():
-    vertices, triangles, colors = few_triangles(5, 4)
-    strided = np.zeros((SIZE[1], 2 * SIZE[0], 4), np.uint8)
-    tl.fill(vertices, triangles, colors, SIZE, background=9, out=strided[:, ::2])
-    assert (strided[:, ::2] == tl.fill(vertices, triangles, colors, SIZE, background=9)).all()
-    assert not strided[:, 1::2].any()
 
 
 def test_fill_without_triangles_is_background():

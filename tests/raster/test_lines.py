@@ -54,22 +54,6 @@ def test_line_far_beyond_the_frame_keeps_its_pixels():
     assert rows(segment((-far, 1), (far, 1), (3, 3))) == ["...", "111", "..."]
 
 
-def test_wireframe_shared_edge_is_the_same_from_both_sides():
-    vertices = np.array([[0, 0], [7, 3], [0, 6], [7, 9]], float)
-    both = tl.wireframe(vertices, [[0, 1, 2], [1, 3, 2]], (8, 10))
-    apart = [tl.wireframe(vertices, [t], (8, 10)) for t in ([2, 1, 0], [3, 1, 2])]
-    assert_same(both, apart[0] | apart[1])
-
-
-def test_wireframe_cull_keeps_the_edges_of_what_is_left():
-    vertices = [[0, 0], [4, 0], [0, 4], [4, 4]]
-    mixed = [[0, 2, 1], [1, 3, 2]]  # both ways round
-    kept = [[[0, 2, 1]], [[1, 3, 2]]]
-    assert_same(tl.wireframe(vertices, mixed, (5, 5), cull="back"), tl.wireframe(vertices, kept[0], (5, 5)))
-    assert_same(tl.wireframe(vertices, mixed, (5, 5), cull="front"), tl.wireframe(vertices, kept[1], (5, 5)))
-    assert not segment((0, 0), (3, 3), (4, 4), cull="back").any()
-
-
 def test_edges_are_listed_once_by_ascending_lower_index():
     triangles = np.random.default_rng(1).integers(0, 30, (400, 3))
     view = View.parse((9, 9), {})
@@ -199,12 +183,6 @@ def test_hidden_antialiased_lines_equal_exact_distances(depth_test, isa):
     exact = ref.smooth_wireframe(*scene.arrays, depth=frags.depth, depth_test=depth_test, **scene.view)
     with on(isa):
         assert abs(tl.wireframe(*scene.arrays, **hidden, **scene.view) - exact).max() <= COVERAGE_SLACK
-
-
-def test_depth_far_away_hides_nothing():
-    scene = PIXEL_SCENES["fan"](np.random.default_rng(1))
-    nothing = np.full(scene.size[::-1], np.inf, np.float32)
-    assert_same(tl.wireframe(*scene.arrays, depth=nothing), tl.wireframe(*scene.arrays))
 
 
 # ---- the call -------------------------------------------------------------------------------------------------------

@@ -7,18 +7,7 @@ import pytest
 from comparing import assert_same, assert_same_buffers, buffers
 from engine_cases import ON_EACH_ISA, on, sharing
 from hypothesis import given
-from strategies import (
-    CLIP_SCENES,
-    PIXEL_SCENES,
-    Scene,
-    clip_scenes,
-    jittered_grid,
-    pixel_scenes,
-    soup,
-    sphere_round_the_eye,
-    turned,
-    with_depth,
-)
+from strategies import CLIP_SCENES, PIXEL_SCENES, clip_scenes, jittered_grid, pixel_scenes, soup, with_depth
 
 import topleft as tl
 
@@ -47,36 +36,6 @@ def test_permuted_triangles_keep_coverage_overdraw_and_depth(make):
         for depth_test in ("less", "greater"):
             got = tl.rasterize(*permuted.arrays, depth_test=depth_test, **scene.view)
             assert_same(got.depth, tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view).depth)
-
-
-def test_permuted_triangles_without_ties_keep_ids():
-    for scene, rng in scenes_of(sphere_round_the_eye):
-        order = rng.permutation(len(scene.triangles))
-        got = tl.rasterize(scene.vertices, scene.triangles[order], scene.size, **scene.view).triangle
-        assert_same(order[got].astype(np.int32), tl.rasterize(*scene.arrays, **scene.view).triangle)
-
-
-@PIXEL
-def test_turned_vertices_keep_coverage_overdraw_and_ids(make):
-    for scene, rng in scenes_of(make):
-        scene = replace(scene, view=scene.view | {"cull": "none"})
-        other = replace(scene, triangles=turned(scene.triangles, rng))
-        for verb in (tl.coverage, tl.overdraw):
-            assert_same(verb(*other.arrays, **scene.view), verb(*scene.arrays, **scene.view))
-        got = tl.rasterize(*other.arrays, depth_test=None, **scene.view)
-        assert_same(got.triangle, tl.rasterize(*scene.arrays, depth_test=None, **scene.view).triangle)
-
-
-@MAKERS
-def test_renumbered_vertices_keep_every_buffer(make):
-    for scene, rng in scenes_of(make):
-        number = rng.permutation(len(scene.vertices) + 3)  # three vertices that nothing uses
-        vertices = np.full((len(number), scene.vertices.shape[1]), 1, scene.vertices.dtype)
-        vertices[number[: len(scene.vertices)]] = scene.vertices
-        if vertices.dtype.kind == "f":
-            vertices[number[-3:]] = np.nan  # and is never looked at
-        other = Scene(vertices, number[scene.triangles], scene.size, scene.view)
-        assert_same_buffers(buffers(other, vertex_rows=np.argsort(number)), buffers(scene))
 
 
 @PIXEL
