@@ -218,15 +218,14 @@ def overdraw_int64(scene: Scene):
     return counts, seen
 
 
-def buffers(scene: Scene, vertex_rows=None, **options):
+def buffers(scene: Scene, **options):
     """Every buffer that the library makes of a scene.
 
-    Attributes are random numbers, a row for each vertex or triangle; `vertex_rows` says which row a vertex takes.
+    Attributes are random numbers, a row for each vertex or triangle.
     """
     options = scene.view | options
     rng = np.random.default_rng(7)
-    rows = {"vertex": np.arange(len(scene.vertices)) if vertex_rows is None else vertex_rows}
-    rows["triangle"] = np.arange(len(scene.triangles))
+    rows = {"vertex": np.arange(len(scene.vertices)), "triangle": np.arange(len(scene.triangles))}
     found = {"coverage": tl.coverage(*scene.arrays, **options), "overdraw": tl.overdraw(*scene.arrays, **options)}
     for depth_test in ("less", "greater", None):
         frags = tl.rasterize(*scene.arrays, depth_test=depth_test, **options)
