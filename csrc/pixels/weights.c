@@ -73,7 +73,7 @@ static int32_t weigh_special(shade_runs *s, const int32_t *corners, int64_t row)
     return e->area == 0.0f ? TL_ALONE : s->n_special + 1;
 }
 
-/* RUN_SPECIAL of a run of unsnapped vertices: float64 if each weight is then within 2^-30, else TL_ALONE. */
+/* RUN_SPECIAL of a run of unsnapped vertices: float64 if each weight is then within 2^-28, else TL_ALONE. */
 static int32_t weigh_exact_run(weighed_span *r, int slot, const int32_t *corners, int64_t row)
 {
     shade_runs *s = &r->runs;

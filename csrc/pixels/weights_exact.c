@@ -3,7 +3,7 @@
  *
  * A float64 edge function is used where its error bound is below 2^-32 of it; elsewhere, near an edge and for slivers,
  * an edge function that is exact to 2^-50.  So each weight is within 2^-30 of its own size, however much w differs.
- * weights.c and paint.c use plain float64 where `has_float_weights` proves weights within 2^-38 of 1. */
+ * weights.c and paint.c use plain float64 where `has_float_weights` proves weights within 2^-36 of 1. */
 #ifndef TL_WEIGHTS_EXACT_C
 #define TL_WEIGHTS_EXACT_C
 
@@ -23,7 +23,7 @@ TL_INLINE exact_point sample_of(const tl_vertex_set *set, int64_t x_px, int64_t 
     return (exact_point){(double)x_px + 0.5 + set->sample_x_fx * unit, (double)y_px + 0.5 + set->sample_y_fx * unit};
 }
 
-/* Whether float64 edge functions over the area are weights within 2^-38: not for slivers, nor where products overflow.
+/* Whether float64 edge functions over the area are weights within 2^-36: not for slivers, nor where products overflow.
  * *area is then twice the area, within 2^-38 of its size. */
 static int has_float_weights(const exact_point *p, double *area)
 {

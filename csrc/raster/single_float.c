@@ -1,7 +1,7 @@
 /* Single: one triangle of any finite float64 vertices by itself, by the ends of rows in float64.
  * In: points in pixels.  Out: spans of samples to the sink.
  *
- * As in rows.c, with u = 2^-53: setup and rows err by at most 9 u XY, so M = 12 u XY, and a quotient by 2.01 u of
+ * As in rows.c, with u = 2^-53: setup and rows err by less than 11.01 u XY, so M = 12 u XY, and a quotient by 2.01 u of
  * itself, 3 u for each column of the box.  Results that are not finite are refined.  Extents may have any size: a box
  * is the samples of the window, and its first sample lies in the extent. */
 #ifndef TL_SINGLE_FLOAT_C

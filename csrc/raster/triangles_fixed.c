@@ -1,9 +1,9 @@
 /* Fixed: TL_LANES triangles at a time with snapped vertices, in 32-bit lanes. In: vertex records and triangles.  Out:
  * boxes, edge functions, depth planes; the triangles that do not fit 32 bits.
  *
- * Range: extents of at most TL_MAX_EXTENT units, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16 bits,
- * products 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and at
- * most 8 bits, so that this holds for corners of pixels up to a pixel outside the extent, except that doubled edge
+ * Range: extents of at most TL_MAX_BOX_PX pixels of 2^8, so |dx|, |dy| < 2^14, doubled relative coordinates fit 16
+ * bits, products 2^30, and doubled edge functions 2^29 (see fixed.h).  Squares and several samples: two pixels less and
+ * at most 8 bits, so that this holds for corners of pixels up to a pixel outside the extent, except that doubled edge
  * functions are below 2^30. */
 #ifndef TL_TRIANGLES_FIXED_C
 #define TL_TRIANGLES_FIXED_C

@@ -23,8 +23,8 @@
  *    2^-18 (X + Y) <= 128 u XY instead of 4 u XY.  Together 147 u XY: E within 156 u XY is refined
  *    (TL_PLACE_BAND), and twice the area errs by less than twice that.  Boxes are those of the places and a unit around
  *    them; a sample beside the extent lies outside of some edge.
- * 3. Rows: v = e0 + i dx, rounded once or twice, errs by 5 u XY at most from E at column 0, the errors of k dy for any
- *    column k included: |v - k d - E| <= 5 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
+ * 3. Rows: v = e0 + i dx, rounded once or twice, errs by less than 5.01 u XY from E at column 0, the errors of k dy for
+ *    any column k included: |v - k d - E| < 5.01 u XY < M = 6 u XY, d = |dy|.  q = v * (1 / d) errs by 2.01 u |q|.
  *    Where |q - k| > M / d + 2.01 u |q| the sign of v - k d is that of E.  So a row end is refined where
  *    |q - nearest integer| <= M / d + 36 u in boxes of up to 17 columns, 130 u in those of up to 62.
  *    Farther out both ends of the comparison are clamped to the box.
