@@ -309,6 +309,60 @@ def test_load_of_an_archive_writes_nothing_outside_of_its_folder(tmp_path, monke
     assert list(inside.iterdir()) == []
 
 
+TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+BROKEN_OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"
+
+
+def members(path, suffix, contents):
+    """Write an archive of members by name."""
+    if suffix == ".zip":
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in contents.items():
+                archive.writestr(name, content)
+    else:
+        with tarfile.open(path, "w:gz") as archive:
+            for name, content in contents.items():
+                row = tarfile.TarInfo(name)
+                row.size = len(content)
+                archive.addfile(row, io.BytesIO(content))
+
+
+@pytest.mark.parametrize("suffix", [".zip", ".tar.gz"])
+@pytest.mark.parametrize("junk", ["__MACOSX/._a.obj", "b/._a.obj", "._a.ply", ".DS_Store", "__MACOSX/b/c.stl"])
+def test_files_that_macos_adds_to_an_archive_are_passed_over(tmp_path, suffix, junk):
+    members(tmp_path / f"a{suffix}", suffix, {junk: b"Mac OS X", "a.obj": TRIANGLE})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(tl.load(tmp_path / f"a{suffix}").triangles) == 1
+
+
+@pytest.mark.parametrize("suffix", [".zip", ".tar.gz"])
+@pytest.mark.parametrize(
+    ("name", "content"), [("b.obj", BROKEN_OBJ), ("b.ply", b"ply\n"), ("b.glb", b"glTF"), ("c/b.stl", b"s")]
+)
+def test_broken_member_of_an_archive_is_left_out_and_named(tmp_path, suffix, name, content):
+    members(tmp_path / f"a{suffix}", suffix, {name: content, "a.obj": TRIANGLE})
+    with pytest.warns(MeshWarning, match=rf"a{suffix}': members of its archive left out: .*{name}"):
+        assert len(tl.load(tmp_path / f"a{suffix}").triangles) == 1
+    members(tmp_path / f"b{suffix}", suffix, {name: content})
+    with pytest.raises(MeshError, match=rf"b{suffix}"):
+        tl.load(tmp_path / f"b{suffix}")
+
+
+def test_member_of_a_zip_with_a_wrong_checksum_is_left_out_and_named(tmp_path):
+    members(tmp_path / "a.zip", ".zip", {"a.obj": TRIANGLE, "b.obj": TRIANGLE + b"# second\n"})
+    content = (tmp_path / "a.zip").read_bytes()
+    (tmp_path / "a.zip").write_bytes(content.replace(b"# second", b"# sEcond", 1))
+    with pytest.warns(MeshWarning, match=r"members of its archive left out: .*b\.obj \(Bad CRC-32"):
+        assert len(tl.load(tmp_path / "a.zip").triangles) == 1
+
+
+def test_limits_of_an_archive_are_those_of_all_its_members(tmp_path):
+    members(tmp_path / "a.zip", ".zip", {"a.obj": TRIANGLE, "b.obj": TRIANGLE})
+    with pytest.raises(MeshError, match="of max_vertices"):
+        tl.load(tmp_path / "a.zip", max_vertices=5)
+
+
 def test_load_of_an_archive_without_a_mesh_or_broken_is_told(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("a.txt", "hello")

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -124,7 +125,7 @@ def test_run_lengths_over_whole_columns_are_few_rectangles(files):
     annotated(files, {"size": [3, 5], "counts": [3, 10, 2]}, {"size": [3, 5], "counts": [0, 15]})
     (found,) = load_polygons(files / "runs.json")
     assert found.owners.tolist() == [0, 0, 1]
-    assert found.polygons[0][8:].tolist() == [[0, 0], [5, 0], [5, 3], [0, 3]]
+    assert found.polygons.points[8:].tolist() == [[0, 0], [5, 0], [5, 3], [0, 3]]
 
 
 def test_crowds_are_drawn_unless_left_out(files, run):
@@ -496,6 +497,31 @@ def test_vector_files_are_read_where_their_packages_are(files, run, suffix):
     assert run("mask", f"a.{suffix}", *arguments) == (0, [])
     expected = tl.polygons([square, other], tl.Grid((7, 4), (0, 7, 0, 4)), values=np.array([2, 1], np.uint8))
     assert np.array_equal(picture("m.tif"), expected)
+
+
+@pytest.mark.parametrize("command", ["mask", "raster"])
+def test_zipped_shapefiles_are_read_whatever_macos_adds(files, run, command):
+    pyogrio = pytest.importorskip("pyogrio")
+    shapely = pytest.importorskip("shapely")
+    geometries = np.array([shapely.box(*box).wkb for box in ((1, 1, 4, 3), (4, 0, 5, 4))], object)
+    pyogrio.raw.write(
+        files / "a.shp", geometries, [np.array([2, 3])], ["zone"], geometry_type="Polygon", crs="EPSG:25832"
+    )
+    with zipfile.ZipFile(files / "a.zip", "w") as archive:
+        archive.writestr("__MACOSX/p/._a.shp", b"Mac OS X")
+        for path in sorted(files.glob("a.*")):
+            if path.suffix != ".zip":
+                archive.write(path, f"p/{path.name}")
+    what, where = ("--labels", "--values")[command == "raster"], ("--size", "5x4", "--extent", 0, 5, 0, 4)
+    assert run(command, "a.zip", "-o", "m.tif", what, "zone", *where, *["--quiet"] * (command == "raster")) == (0, [])
+    assert picture("m.tif").tolist() == [[0] * 4 + [3]] + [[0, 2, 2, 2, 3]] * 2 + [[0] * 4 + [3]]
+    with zipfile.ZipFile(files / "a.zip", "a") as archive:
+        archive.writestr("b.geojson", b"{}")
+    status, (line,) = run("mask", "a.zip", "-o", "m.tif")
+    assert (status, line.endswith("its archive must hold one vector file, got p/a.shp, b.geojson")) == (2, True)
+    (files / "a.zip").write_bytes(b"PK")
+    status, (line,) = run("mask", "a.zip", "-o", "m.tif")
+    assert (status, "cannot read 'a.zip': its archive is broken" in line) == (2, True)
 
 
 @pytest.mark.parametrize("suffix", ["gpkg", "shp"])

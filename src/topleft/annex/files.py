@@ -6,19 +6,19 @@ from topleft._meshes.io import png
 from topleft._meshes.io.layer_files import layer_paths, save_layers
 from topleft._meshes.io.limits.budget import LIMITS, Budget
 from topleft._meshes.io.limits.npy import arrays_of
-from topleft._meshes.io.polygon_files import NO_RINGS, VECTOR_SUFFIXES, PolygonPicture, load_polygons
+from topleft._meshes.io.polygon_files import NO_RINGS, PolygonPicture, has_polygons, load_polygons
 from topleft._meshes.io.references import read_picture
 
 __all__ = [
     "LIMITS",
     "NO_RINGS",
-    "VECTOR_SUFFIXES",
     "Budget",
     "PolygonPicture",
     "annotation_members",
     "annotation_of",
     "arrays_of",
     "encode_polygons",
+    "has_polygons",
     "layer_paths",
     "load_polygons",
     "png",

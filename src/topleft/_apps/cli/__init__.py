@@ -7,6 +7,7 @@ Exit status: 0, all pictures were written; 1, some of several inputs failed and 
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 import threading
@@ -27,6 +28,7 @@ from topleft._apps.cli.raster import add_raster_command
 from topleft._apps.cli.render import run_render
 from topleft._apps.cli.report import TOLD, complain, complain_of_lacks, one_line
 from topleft._core.base.notes import listening
+from topleft.errors import MeshWarning
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     try:
         with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
-            warnings.simplefilter("ignore", RuntimeWarning)  # NumPy's, for numbers that overflow: they span lines
+            warnings.showwarning = tell_of_ours
             status: int = options.run(options)
         complain_of_lacks(lacks)
     except TOLD as error:
@@ -56,6 +58,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain("a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume")
         return FAILED
     return status
+
+
+def tell_of_ours(message: Warning | str, category: type[Warning], filename: str, *_: object) -> None:
+    """Print a warning of topleft in one line; those of other packages are for programmers."""
+    if category in (UserWarning, MeshWarning) and f"{os.sep}topleft{os.sep}" in filename:
+        complain(" ".join(str(message).split()))
 
 
 class Terminated(BaseException):

@@ -182,20 +182,20 @@ def frame_of(picture: PolygonPicture, options: argparse.Namespace) -> tuple[Any,
     like = None if options.like is None else Grid.like(options.like)
     if like is not None and (options.size is not None or options.extent is not None):
         raise UsageError("--like says size and extent: give neither beside it")
-    (points, rings, polygon_offsets), crs = picture.polygons, options.crs or (picture.crs if like is None else like.crs)
+    rings, crs = picture.polygons, options.crs or (picture.crs if like is None else like.crs)
     if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
         if options.crs is None:
             raise UsageError(f"{options.file} is of {picture.crs}, {options.like} of {crs}: --crs {crs} transforms it")
-        points = transformed(points, picture.crs, crs)
+        rings = replace(rings, points=transformed(rings.points, picture.crs, crs))
     if like is not None:
         if like.crs is not None and crs is not None and not is_same_crs(like.crs, crs):
             raise UsageError(f"--crs must be that of --like, {like.crs}, got {crs}")
         grid = like
     else:
-        grid = grid_over(points, options)
+        grid = grid_over(rings.points, options)
     nodata = grid.nodata if options.nodata is None else options.nodata
     is_label = options.labels is not None and nodata is not None and float(nodata).is_integer()
-    return (points, rings, polygon_offsets), replace(grid, crs=crs, nodata=nodata if is_label else None)
+    return rings, replace(grid, crs=crs, nodata=nodata if is_label else None)
 
 
 def grid_over(points: npt.NDArray[np.float64], options: argparse.Namespace) -> Grid:

@@ -28,7 +28,7 @@ from topleft._core.base.georeference import is_same_crs, transformed
 from topleft._core.base.grid import grid_around
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
-from topleft.annex.files import VECTOR_SUFFIXES, load_polygons
+from topleft.annex.files import has_polygons, load_polygons
 from topleft.annex.windows import WINDOW, extent_of, open_triangles
 from topleft.typing import RasterKindOption
 
@@ -131,10 +131,9 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
     numbers = np.arange(len(picture.objects), dtype=np.int32)
     if options.values is not None:
         numbers = numbers_of(picture, "--values", options.values, options.mesh, nodata, is_whole=False)
-    (points, rings, offsets), crs = picture.polygons, options.crs or picture.crs
+    subject, crs = picture.polygons, options.crs or picture.crs
     if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
-        points = transformed(points, picture.crs, crs)
-    subject = points, rings, offsets
+        subject = replace(subject, points=transformed(subject.points, picture.crs, crs))
     step = options.pixel_size if options.pixel_size is None or len(options.pixel_size) > 1 else options.pixel_size[0]
     grid = grid_around(options.extent or extent_of(subject), options.size, step, "up")
     kind: Any = "coverage"
@@ -149,7 +148,7 @@ def raster_of(options: argparse.Namespace) -> Tiles:
     """Return the raster of the options."""
     if (options.pixel_size is None) == (options.size is None):
         raise UsageError("either --pixel-size or --size must say how large the raster is")
-    if Path(options.mesh).suffix.lower() in (*VECTOR_SUFFIXES, ".geojson", ".json"):
+    if has_polygons(Path(options.mesh)):
         return raster_of_polygons(options)
     named = options.mesh.split(",")
     mesh = tuple(named) if len(named) == 2 and all(name.endswith(".npy") for name in named) else options.mesh

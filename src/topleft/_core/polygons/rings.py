@@ -6,8 +6,10 @@ In: arrays, lists of rings, offset arrays, flat COCO lists, `__geo_interface__`,
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,9 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import I64
 from topleft._core.base.arrays import apart_from, as_aligned, as_array, check_real, set_aligned
+
+LOWER_KINDS = ("Point", "MultiPoint", "LineString", "MultiLineString", "LinearRing")
+"""Geometries that cover no area."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +66,10 @@ def as_rings(values: Any) -> RingSet:
     rings = _from_shapely(values)
     if rings is None:
         values = values.to_numpy() if hasattr(values, "to_numpy") else values
-        listed = [_rings_of_geometry(g) for g in _geometries(values)] if _is_geometry(values) else _nested(values)
-        rings = _join(listed)
+        if _is_geometry(values):
+            rings = _join([list(chain.from_iterable(_parts_of_geometry(one))) for one in _geometries(values)])
+        else:
+            rings = _join(_nested(values))
     return _checked(rings)
 
 
@@ -90,15 +97,21 @@ def as_points(values: Any, name: str) -> npt.NDArray[Any]:
 
 
 def _without_tensors(values: Any) -> Any:
-    """Convert arrays of other libraries to NumPy arrays, alone or in lists; tests the first element of each list."""
+    """Convert arrays of other libraries to NumPy arrays, and contours of OpenCV (N, 1, 2) to rings, alone or in lists.
+
+    Tests the first element of each list.
+    """
     if _is_tensor(values):
-        return as_array("rings", values)
+        values = as_array("rings", values)
+        return values[:, 0] if values.shape[1:] == (1, 2) else values
     if isinstance(values, (list, tuple)) and _has_tensors(values):
         return [*map(_without_tensors, values)] if isinstance(values, list) else (*map(_without_tensors, values),)
     return values
 
 
 def _is_tensor(value: Any) -> bool:
+    if isinstance(value, np.ndarray) and value.shape[1:] == (1, 2):  # a contour of OpenCV
+        return True
     if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
         return False
     return hasattr(value, "__dlpack__") or hasattr(value, "__array__")
@@ -180,6 +193,13 @@ def _from_shapely(values: Any) -> RingSet | None:
         return None
     geometries = np.array(values, dtype=object)
     geometries[shapely.is_missing(geometries)] = shapely.Polygon()  # as a GeoJSON feature without a geometry
+    for i in np.flatnonzero(shapely.get_type_id(geometries) == shapely.GeometryType.GEOMETRYCOLLECTION).tolist():
+        parts = shapely.get_parts(geometries[i])
+        while (shapely.get_type_id(parts) >= shapely.GeometryType.MULTIPOINT).any():  # collections in collections
+            parts = shapely.get_parts(parts)
+        is_area = shapely.get_type_id(parts) == shapely.GeometryType.POLYGON
+        _tell_of({part.geom_type for part in parts[~is_area].tolist()})
+        geometries[i] = shapely.MultiPolygon(parts[is_area].tolist())
     kinds = np.unique(shapely.get_type_id(geometries))
     if not set(kinds.tolist()) <= {3, 6}:
         names = sorted({g.geom_type for g in geometries.tolist() if g is not None} - {"Polygon", "MultiPolygon"})
@@ -204,20 +224,31 @@ def _geometries(values: Any) -> list[Any]:
     return [values]
 
 
-def _rings_of_geometry(geometry: Any) -> list[Any]:
-    """Return the rings of a GeoJSON geometry."""
+def _parts_of_geometry(geometry: Any, *, is_member: bool = False) -> Iterator[list[Any]]:
+    """Yield the rings of each part of a GeoJSON geometry; of a member of a collection only if it is an area."""
     if geometry is None:
-        return []
+        return
     kind = geometry.get("type") if isinstance(geometry, dict) else type(geometry).__name__
     if kind == "Feature":
-        return _rings_of_geometry(geometry.get("geometry"))
-    if kind == "GeometryCollection":
-        return [ring for part in _member(geometry, "geometries") for ring in _rings_of_geometry(part)]
-    if kind == "Polygon":
-        return [_xy(ring) for ring in _member(geometry, "coordinates")]
-    if kind == "MultiPolygon":
-        return [_xy(ring) for part in _member(geometry, "coordinates") for ring in part]
-    raise TypeError(f"geometries must be Polygon or MultiPolygon, got {kind}")
+        yield from _parts_of_geometry(geometry.get("geometry"))
+    elif kind == "GeometryCollection":
+        for part in _member(geometry, "geometries"):
+            yield from _parts_of_geometry(part, is_member=True)
+    elif kind in ("Polygon", "MultiPolygon"):
+        areas = _member(geometry, "coordinates")
+        for rings in [areas] if kind == "Polygon" else areas:
+            yield [_xy(ring) for ring in rings]
+    elif is_member and kind in LOWER_KINDS:
+        _tell_of({kind})
+    else:
+        raise TypeError(f"geometries must be Polygon or MultiPolygon, got {kind}")
+
+
+def _tell_of(kinds: set[str]) -> None:
+    """Warn of members of a collection that cover nothing."""
+    if kinds:
+        message = f"polygons leave out {', '.join(sorted(kinds))} in a GeometryCollection: they cover no area"
+        warnings.warn(message, stacklevel=2)
 
 
 def _member(geometry: Any, key: str) -> Any:

@@ -11,7 +11,9 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -19,7 +21,7 @@ import numpy as np
 from topleft._core.base.arrays import as_crease, as_path, as_scale, as_seconds, shown
 from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._core.base.notes import tell
-from topleft._meshes.io.limits.budget import Budget
+from topleft._meshes.io.limits.budget import Budget, OverLimitError
 from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.material import TEXTURES
@@ -202,9 +204,8 @@ def _parts(source: InputFile) -> list[Mesh]:
     if suffix in ARCHIVE_SUFFIXES:
         from topleft._meshes.io.limits.archives import unpacked
 
-        with unpacked(source.path, source.budget) as (folder, paths):
-            members = [InputFile(path, source.budget, archive=source, home=folder) for path in paths]
-            return [part for member in members for part in _parts(member)]
+        with unpacked(source.path, source.budget, source.notes) as (folder, paths):
+            return _parts_of_members(source, folder, paths)
     if suffix in MESHIO_READERS:
         from topleft._meshes.io.solvers import read_by_meshio
 
@@ -212,6 +213,25 @@ def _parts(source: InputFile) -> list[Mesh]:
     module, _, name = READERS.get(suffix, "foreign.read_by_trimesh").rpartition(".")
     read: Callable[[InputFile], list[Mesh]] = getattr(import_module(f"topleft._meshes.io.{module}"), name)
     return read(source)
+
+
+def _parts_of_members(source: InputFile, folder: Path, paths: list[Path]) -> list[Mesh]:
+    """The meshes of the members of an archive; one that is broken is told, unless all are."""
+    parts: list[Mesh] = []
+    errors = []
+    for path in paths:
+        member = InputFile(path, source.budget, archive=source, home=folder)
+        try:
+            parts += reading(member, partial(_parts, member))
+        except OverLimitError:
+            raise
+        except (MeshError, FileNotFoundError) as error:
+            errors.append(error)
+            name = path.relative_to(folder).as_posix()
+            source.notes.add("members of its archive left out", f"{name} ({str(error).replace(str(folder) + '/', '')})")
+    if errors and len(errors) == len(paths):
+        raise errors[0]
+    return parts
 
 
 def _points(source: InputFile) -> Points:
@@ -256,7 +276,7 @@ def reading(source: InputFile, read: Callable[[], Made]) -> Made:
     except MissingPackageError:
         raise
     except MeshError as error:
-        if repr(str(path)) in str(error):
+        if repr(str(path)) in str(error) or isinstance(error, OverLimitError):
             raise
         raise MeshError(f"cannot read {str(path)!r}: broken, or not a {path.suffix!r} file ({error})") from error
     except MemoryError as error:

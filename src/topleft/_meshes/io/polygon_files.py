@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,9 @@ import numpy.typing as npt
 
 from topleft._core.base.georeference import WGS84
 from topleft._core.base.notes import Notes, tell
+from topleft._core.polygons.rings import LOWER_KINDS, RingSet
 from topleft._core.raster.rle import read_counts
+from topleft._meshes.io.limits.archives import is_junk
 from topleft.errors import MeshError, MissingPackageError
 
 BROKEN = (KeyError, TypeError, AttributeError, IndexError, ValueError, OverflowError)
@@ -67,12 +71,12 @@ class PolygonPicture:
         return {i: self.objects[i].get(name) for i, part in enumerate(self.parts) if len(part.counts)}
 
     @property
-    def polygons(self) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Points, where their rings begin and end, and the polygons of these: the input of `polygons`."""
+    def polygons(self) -> RingSet:
+        """The parts of all objects, a polygon each."""
         points = np.concatenate([np.empty((0, 2)), *(part.points for part in self.parts)])
         lengths = np.concatenate([np.zeros(1, np.int64), *(part.lengths for part in self.parts)])
         counts = np.concatenate([np.zeros(1, np.int64), *(part.counts for part in self.parts)])
-        return points, np.cumsum(lengths), np.cumsum(counts)
+        return RingSet(points, np.cumsum(lengths), np.cumsum(counts))
 
     @property
     def owners(self) -> npt.NDArray[np.int64]:
@@ -80,7 +84,8 @@ class PolygonPicture:
         return np.repeat(np.arange(len(self.parts)), [len(part.counts) for part in self.parts])
 
 
-VECTOR_SUFFIXES = (".fgb", ".gml", ".gpkg", ".kml", ".parquet", ".shp", ".sqlite")
+VECTOR_SUFFIXES = (".fgb", ".gml", ".gpkg", ".kml", ".parquet", ".shp", ".sqlite", ".zip")
+POLYGON_SUFFIXES = (*VECTOR_SUFFIXES, ".geojson", ".geojsonl", ".geojsons", ".json", ".jsonl", ".ndjson")
 
 
 def load_polygons(
@@ -96,7 +101,7 @@ def load_polygons(
         raise MeshError(f"{str(path)!r} is {'a folder' if path.is_dir() else 'a pipe or a device'}, not a file")
     is_vector, notes = path.suffix.lower() in VECTOR_SUFFIXES, Notes(str(path))
     try:
-        content = _vector_content(path, layer) if is_vector else json.loads(path.read_bytes())
+        content = _vector_content(path, layer) if is_vector else _json_content(path.read_bytes())
     except (ValueError, RecursionError) as error:
         raise MeshError(f"cannot read {str(path)!r}: {error}") from None
     try:
@@ -128,17 +133,67 @@ def leaving_out(what: str, notes: Notes) -> Iterator[None]:
         notes.add("objects left out", f"{what} {reason}")
 
 
+def _json_content(text: bytes) -> Any:
+    """The content of a JSON file, or of a file with a GeoJSON text on each line or after each record separator."""
+    try:
+        return json.loads(text)
+    except ValueError:
+        rows = list(filter(None, map(bytes.strip, text.split(b"\x1e") if b"\x1e" in text else text.splitlines())))
+        if len(rows) < 2 or not isinstance(_row_content(rows[0]), dict):
+            raise
+    features: list[Any] = []
+    for row in map(_row_content, rows):
+        is_several = isinstance(row, dict) and row.get("type") == "FeatureCollection"
+        features += row["features"] if is_several else [row]
+    return {"type": "FeatureCollection", "features": features}
+
+
+def _row_content(row: bytes) -> Any:
+    """The content of a text of JSON, or its error."""
+    try:
+        return json.loads(row)
+    except ValueError as error:
+        return error
+
+
+def has_polygons(path: Path) -> bool:
+    """Whether a file holds polygons, by its name; of an archive by the names in it."""
+    suffix = path.suffix.lower()
+    return suffix in POLYGON_SUFFIXES and not (suffix == ".zip" and zipfile.is_zipfile(path) and not _members(path))
+
+
+def _members(path: Path) -> list[str]:
+    """The vector files in an archive."""
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    return [name for name in names if Path(name).suffix.lower() in POLYGON_SUFFIXES and not is_junk(name)]
+
+
+def _member_of(path: Path) -> str:
+    """The name for GDAL of the only vector file in an archive."""
+    names = _members(path)
+    if len(names) != 1:
+        raise ContentError(f"its archive must hold one vector file, got {', '.join(names) or 'none'}")
+    return f"/vsizip/{path.absolute().as_posix()}/{names[0]}"
+
+
 def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
     """A layer of a vector file in the form of GeoJSON."""
     path.stat()  # a missing file is a FileNotFoundError, as of other formats
     try:
+        name = _member_of(path) if path.suffix.lower() == ".zip" else str(path)
+    except zipfile.BadZipFile as error:
+        raise ContentError(f"its archive is broken ({error})") from None
+    try:
         import pyogrio
         import shapely
     except ImportError:
-        return _fiona_content(path, layer)
+        return _fiona_content(path, name, layer)
     try:
-        said, _, geometries, columns = pyogrio.raw.read(str(path), layer=layer, force_2d=True)
-        shapes = shapely.from_wkb(geometries)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of measured coordinates, which are dropped with the heights
+            said, _, geometries, columns = pyogrio.raw.read(name, layer=layer, force_2d=True)
+        shapes = shapely.from_wkb(geometries, on_invalid="ignore")  # None: a feature without polygons
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, shapely.errors.ShapelyError) as error:
         raise MeshError(f"cannot read {str(path)!r}: {' '.join(str(error).split())}") from None
     rows = [dict(zip(said["fields"], row, strict=True)) for row in zip(*(c.tolist() for c in columns), strict=True)]
@@ -149,13 +204,13 @@ def _vector_content(path: Path, layer: str | None) -> dict[str, Any]:
     return {"type": "FeatureCollection", "features": features, "own crs": said["crs"]}
 
 
-def _fiona_content(path: Path, layer: str | None) -> dict[str, Any]:
+def _fiona_content(path: Path, name: str, layer: str | None) -> dict[str, Any]:
     try:
         import fiona
     except ImportError:
         raise MissingPackageError(f"reading {str(path)!r} needs another package: pip install pyogrio shapely") from None
     try:
-        with fiona.open(path, layer=layer) as rows:
+        with fiona.open(name, layer=layer) as rows:
             features = [{"type": "Feature", **row.__geo_interface__} for row in rows]
             return {"type": "FeatureCollection", "features": features, "own crs": rows.crs.to_string()}
     except fiona.errors.FionaError as error:
@@ -273,11 +328,13 @@ def _geojson(content: Mapping[str, Any], name: str, notes: Notes) -> PolygonPict
         said: dict[str, Any] = {}
         parts = NO_RINGS
         with leaving_out(f"feature {i}", notes):
+            if isinstance(feature, ValueError):
+                raise ContentError(f"is no JSON: {feature}")
             is_feature = feature["type"] == "Feature"
             if is_feature:
                 said = {**({"id": feature["id"]} if "id" in feature else {}), **(feature.get("properties") or {})}
             geometry = feature["geometry"] if is_feature else feature
-            parts = _joined(list(_parts(geometry)) if geometry else [], f"feature {i}", notes)
+            parts = _joined(list(_parts(geometry, f"feature {i}", notes)) if geometry else [], f"feature {i}", notes)
         picture.add(parts, said)
     return replace(picture, crs=_crs_of(content, picture))
 
@@ -289,15 +346,17 @@ def _crs_of(content: Mapping[str, Any], picture: PolygonPicture) -> str | None:
     named = (content.get("crs") or {}).get("properties", {}).get("name")
     if named is not None:
         return WGS84 if str(named).upper().endswith("CRS84") else str(named)
-    points = np.abs(picture.polygons[0])
+    points = np.abs(picture.polygons.points)
     return WGS84 if (points <= (180, 90)).all() else None
 
 
-def _parts(geometry: Mapping[str, Any]) -> Iterator[list[Any]]:
+def _parts(geometry: Mapping[str, Any], what: str, notes: Notes) -> Iterator[list[Any]]:
     """Yield the rings of each polygon."""
     if geometry["type"] == "GeometryCollection":
         for part in geometry["geometries"]:
-            yield from _parts(part)
+            yield from _parts(part, what, notes)
+            if part["type"] in LOWER_KINDS:
+                notes.add("parts left out", f"{what} has a {part['type']} beside polygons")
     elif geometry["type"] in ("Polygon", "MultiPolygon"):
         polygons = geometry["coordinates"] if geometry["type"] == "MultiPolygon" else [geometry["coordinates"]]
         for rings in polygons:

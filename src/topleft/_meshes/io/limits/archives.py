@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Protocol
 
+from topleft._core.base.notes import Notes
 from topleft._meshes.io.limits.budget import Budget
 from topleft.errors import MeshError
 
@@ -43,14 +44,14 @@ class SupportsRead(Protocol):
 
 
 @contextmanager
-def unpacked(archive: Path, budget: Budget) -> Iterator[tuple[Path, list[Path]]]:
+def unpacked(archive: Path, budget: Budget, notes: Notes) -> Iterator[tuple[Path, list[Path]]]:
     """A folder that goes when the block ends, and the mesh files of an archive in it, in their order."""
     with tempfile.TemporaryDirectory(prefix="topleft-") as name:
         folder = Path(name).resolve()
         try:
             with archive.open("rb") as file:
                 budget.read(archive.stat().st_size)
-                paths = _written(file, archive, budget, folder)
+                paths = _written(file, archive, budget, folder, notes)
         except BROKEN as error:
             raise MeshError(f"its archive is broken ({error})") from error
         if not paths:
@@ -75,11 +76,11 @@ class Counted:
         return piece
 
 
-def _written(file: IO[bytes], packed: Path, budget: Budget, folder: Path) -> list[Path]:
+def _written(file: IO[bytes], packed: Path, budget: Budget, folder: Path, notes: Notes) -> list[Path]:
     """Write the files of an archive into a folder; return the meshes among them."""
     suffix = packed.suffix.lower()
     if suffix in (".zip", ".zae"):
-        return _written_of_zip(file, budget, folder)
+        return _written_of_zip(file, budget, folder, notes)
     stem = Path(packed.stem)
     with bz2.BZ2File(file) if suffix == ".bz2" else gzip.GzipFile(fileobj=file) as content:
         counted = Counted(content, budget)
@@ -95,21 +96,40 @@ def _written(file: IO[bytes], packed: Path, budget: Budget, folder: Path) -> lis
                 if path is not None and member is not None:
                     _write(member, path)
                     paths.append(path)
-    return [path for path in paths if path.suffix.lower() in MESH_SUFFIXES]
+    return [path for path in paths if is_mesh(path)]
 
 
-def _written_of_zip(file: IO[bytes], budget: Budget, folder: Path) -> list[Path]:
-    paths = []
+def _written_of_zip(file: IO[bytes], budget: Budget, folder: Path, notes: Notes) -> list[Path]:
+    paths, broken = [], []
     with zipfile.ZipFile(file) as archive:
         budget.check("max_unpacked_bytes", sum(row.file_size for row in archive.infolist()))
         for row in archive.infolist():
             _check_method(row)
             path = None if row.is_dir() else _place(folder, row.filename, budget)
             if path is not None:
-                with archive.open(row) as member:
-                    _write(Counted(member, budget), path)
-                paths.append(path)
-    return [path for path in paths if path.suffix.lower() in MESH_SUFFIXES]
+                try:
+                    with archive.open(row) as member:
+                        _write(Counted(member, budget), path)
+                    paths.append(path)
+                except BROKEN as error:
+                    path.unlink(missing_ok=True)
+                    broken.append(error)
+                    notes.add("members of its archive left out", f"{row.filename} ({error})")
+    meshes = [path for path in paths if is_mesh(path)]
+    if broken and not meshes:
+        raise broken[0]
+    return meshes
+
+
+def is_junk(name: str) -> bool:
+    """Whether macOS has added a member to an archive."""
+    parts = name.split("/")
+    return "__MACOSX" in parts or parts[-1].startswith("._") or parts[-1] == ".DS_Store"
+
+
+def is_mesh(path: Path) -> bool:
+    """Whether an unpacked member is to be read as a mesh."""
+    return path.suffix.lower() in MESH_SUFFIXES and not is_junk(path.as_posix())
 
 
 def _check_method(row: zipfile.ZipInfo) -> None:

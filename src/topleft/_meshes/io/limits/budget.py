@@ -35,6 +35,10 @@ LIMITS = {
 """By the options of `topleft.load`. 8 bytes of text are one in an archive; 16 pixels a byte are plain ones of PNG."""
 
 
+class OverLimitError(MeshError):
+    """More than the limits of a file allow: no member of it is read then."""
+
+
 class Budget:
     """The part of its limits that a file, with all that it names and holds, has used.
 
@@ -64,7 +68,7 @@ class Budget:
     def check(self, option: str, n: int) -> None:
         """Raise an error unless so many more are allowed; they are not counted yet."""
         if not self.has(option, n):
-            raise MeshError(
+            raise OverLimitError(
                 f"{self._name!r} has {self._spent[option] + n} {LIMITS[option].what}, more than the "
                 f"{self.limit(option)} of {option}"
             )
