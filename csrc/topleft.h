@@ -350,10 +350,10 @@ typedef struct {
     int n_channels, is_u8, is_flat;
     tl_blend blend;
     int is_premultiplied; /* colours are multiplied by alpha; otherwise the last of 2 or 4 channels is alpha */
-    const void *ground;   /* the initial colour of all pixels, of uint8 in `blend`; NULL: they keep their colours */
+    const void *ground;   /* the initial colour of all pixels; NULL: they keep their colours */
     int is_area;          /* colours are weighted by the covered area of the pixel; otherwise its centre decides */
     int64_t band_rows;    /* rows of a band, > 0: with fewer rows all triangles are set up more often */
-    int32_t *packed;      /* uint8 with other than 4 channels: room for the window */
+    int32_t *packed;      /* uint8 with other than 4 channels: room for a band */
     int32_t *cells;       /* is_area: tl_blend_cells(width), all TL_CELL_CLEAR before and after */
 } tl_canvas;
 

@@ -297,7 +297,6 @@ static int64_t blend(const tl_snapped *snapped, const tl_window *window, const t
         band.y_px += row;
         band.height = min64(rows_at_once, window->height - row);
         part.pixels = (char *)canvas->pixels + row * canvas->stride_px * pixel_bytes;
-        part.packed = canvas->packed ? canvas->packed + row * window->width : NULL;
         const int64_t bad_row = blend_window(snapped, &band, &part);
         if (bad_row >= 0)
             return bad_row;

@@ -13,6 +13,7 @@
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
 #include "vertex/setup.c"
+#include "sink/pixel_runs.c"
 #include "area/area.c"
 #include "area/ramp.c"
 #include "blend/blend_strip.c"
@@ -130,10 +131,10 @@ TL_INLINE int blend_between(blend_state *b, const area_plane *plane, blend_side 
         }
         /* from left to right: writing right of the triangle first takes 1.6 times as long */
         if (first[k] > start)
-            put_solid(b->packed + start, first[k] - start, b->ground);
-        put_solid(b->packed + first[k], at[1][k] - first[k], over_ground[0]);
+            put_words(b->packed + start, first[k] - start, b->ground, 0);
+        put_words(b->packed + first[k], at[1][k] - first[k], over_ground[0], 0);
         if (at[1][k] < end)
-            put_solid(b->packed + at[1][k], end - at[1][k], b->ground);
+            put_words(b->packed + at[1][k], end - at[1][k], b->ground, 0);
     }
     b->n_laid = max64(b->n_laid, row + n);
     for (int k = 0; k < 2; k++)

@@ -43,7 +43,7 @@ typedef struct blend_state {
     float *floats;              /* float32: a channel a lane */
     int64_t stride;             /* in pixels, of either */
     int64_t n_samples;
-    int32_t ground; /* the initial colour of all pixels; uint8 */
+    int32_t ground; /* the initial colour of all pixels, packed; uint8 */
     int64_t n_laid; /* the first n_laid rows are filled with `ground`; all rows where there is no ground */
     int n_channels, is_flat;
     tl_mix mode;

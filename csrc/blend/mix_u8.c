@@ -8,8 +8,13 @@
 
 #include <stdint.h>
 
+#include "topleft.h"
 #include "lanes/lanes.h"
+#include "vertex/fixed.h"
+#include "sink/pixel_runs.c"
 #include "blend/mix.h"
+
+#define TL_BLOCK (8 * TL_LANES) /* pixels that are unpacked at once where they have one colour */
 
 /* ---- a colour over the whole pixel ------------------------------------------------------------------------------- */
 
@@ -173,27 +178,16 @@ TL_INLINE vi load_u8(const blend_state *b, int64_t at, vm m)
     return vi_load_some(m, b->packed + at, at >= 0 && at + TL_LANES <= b->n_samples);
 }
 
-/* Writes n > 0 pixels of one colour.  A long run is stored in whole vectors, unaligned at both ends and aligned
- * between, because a store across two cache lines takes twice as long. */
-TL_INLINE void put_solid(int32_t *pixels, int64_t n, int32_t color)
-{
-    const vi colors = vi_set1(color);
-    if (n < TL_LANES) {
-        vi_store_some(pixels, vm_first(n), colors, 0);
-        return;
-    }
-    int32_t *const last = pixels + n - TL_LANES;
-    vi_store(pixels, colors);
-    for (int32_t *p = pixels + TL_LANES - ((uintptr_t)pixels >> 2) % TL_LANES; p < last; p += TL_LANES)
-        vi_store(p, colors);
-    vi_store(last, colors);
-}
-
 /* Fills rows below end_row with the ground, if they are not filled yet. */
-static inline void lay_ground(blend_state *b, int64_t end_row)
+static void lay_ground(blend_state *b, int64_t end_row)
 {
+    const int64_t width = b->window->width;
     for (; b->n_laid < end_row; b->n_laid++)
-        put_solid(b->packed + b->n_laid * b->stride, b->window->width, b->ground);
+        if (b->packed)
+            put_words(b->packed + b->n_laid * b->stride, width, b->ground, 0);
+        else
+            put_run((char *)(b->floats + b->n_laid * b->stride * b->n_channels), width, b->canvas->ground,
+                    4 * b->n_channels, 0);
 }
 
 /* Mixes n_rows runs of pixels that the triangle covers wholly: n[k * step] pixels from first[k * step] on, none where n
@@ -246,7 +240,7 @@ static void pack_u8(const uint8_t *pixels, int64_t n, int n_channels, int32_t *r
                                pixels[3 * k]);
 }
 
-static void unpack_u8(const int32_t *packed, int64_t n, int n_channels, uint8_t *restrict pixels)
+static void unpack_each_u8(const int32_t *packed, int64_t n, int n_channels, uint8_t *restrict pixels)
 {
     for (int64_t k = 0; k < n; k++) {
         const uint32_t p = (uint32_t)packed[k];
@@ -255,6 +249,33 @@ static void unpack_u8(const int32_t *packed, int64_t n, int n_channels, uint8_t 
             pixels[2 * k + 1] = (uint8_t)(p >> 24);
         if (n_channels == 3)
             pixels[3 * k + 1] = (uint8_t)(p >> 8), pixels[3 * k + 2] = (uint8_t)(p >> 16);
+    }
+}
+
+/* Whether TL_BLOCK pixels have one colour. */
+TL_INLINE int is_block_of(const int32_t *packed, vi color)
+{
+    vi differs = vi_set1(0);
+    for (int k = 0; k < TL_BLOCK; k += TL_LANES)
+        differs = vi_or(differs, vi_xor(vi_load(packed + k), color));
+    return !vm_any(vi_gt_unsigned(differs, vi_set1(0)));
+}
+
+/* Blocks of one colour are written as one run, by vectors. */
+static void unpack_u8(const int32_t *packed, int64_t n, int n_channels, uint8_t *pixels)
+{
+    uint8_t color[4];
+    for (int64_t k = 0, end; k < n; k = end) {
+        const vi first = vi_set1(packed[k]);
+        for (end = k; end + TL_BLOCK <= n && is_block_of(packed + end, first);)
+            end += TL_BLOCK;
+        if (end > k) {
+            unpack_each_u8(packed + k, 1, n_channels, color);
+            put_run((char *)pixels + n_channels * k, end - k, (const char *)color, n_channels, 0);
+        } else {
+            end = min64(k + TL_BLOCK, n);
+            unpack_each_u8(packed + k, end - k, n_channels, pixels + n_channels * k);
+        }
     }
 }
 

@@ -18,7 +18,8 @@ TL_INLINE void put_words(int32_t *pixels, int64_t n, int32_t value, int may_over
     int32_t *const end = pixels + n;
     int32_t *p = pixels + TL_LANES - ((uintptr_t)pixels >> 2) % TL_LANES;
     if (!may_overrun && n < TL_LANES) {
-        vi_store_masked(pixels, vm_first(n), values);
+        for (int64_t k = 0; k < n; k++)
+            pixels[k] = value;
         return;
     }
     vi_store(pixels, values);
@@ -70,6 +71,20 @@ TL_INLINE void put_patterns(char *pixels, int64_t n, const char *value, int64_t 
     memcpy(pixels + all - period, pattern, (size_t)period); /* some of it again */
 }
 
+/* n > 0 pixels of one value; `may_overrun` as for put_words. */
+TL_INLINE void put_run(char *pixels, int64_t n, const char *value, int pixel_bytes, int may_overrun)
+{
+    int32_t word;
+    if (pixel_bytes == 1) {
+        memset(pixels, value[0], (size_t)n);
+    } else if (pixel_bytes == 4) {
+        memcpy(&word, value, 4);
+        put_words((int32_t *)(void *)pixels, n, word, may_overrun);
+    } else {
+        put_patterns(pixels, n, value, pixel_bytes, pixel_bytes % 3 ? 1 : 3);
+    }
+}
+
 /* A run that is known as far as `end`, and may go on, in the next row, too, if rows follow one another.
  * Pixels are counted from the first one of the rows that this pass writes. */
 typedef struct {
@@ -88,21 +103,9 @@ TL_INLINE open_run start_pixels(void *pixels, int64_t width, int64_t n_rows, int
 /* Writes the known pixels, and may write a few more, which are written again later. */
 TL_INLINE void close_run(const open_run *run, int pixel_bytes)
 {
-    char *const pixels = run->pixels + run->first * pixel_bytes;
-    const int64_t n = run->end - run->first;
     const int may_overrun = run->n_px - run->end >= 4 * TL_LANES;
-    int32_t word;
-    if (n <= 0)
-        return;
-    memcpy(&word, run->value, 4);
-    if (pixel_bytes == 1)
-        memset(pixels, run->value[0], (size_t)n);
-    else if (pixel_bytes == 4)
-        put_words((int32_t *)(void *)pixels, n, word, may_overrun);
-    else if (pixel_bytes % 3)
-        put_patterns(pixels, n, run->value, pixel_bytes, 1);
-    else
-        put_patterns(pixels, n, run->value, pixel_bytes, 3);
+    if (run->first < run->end)
+        put_run(run->pixels + run->first * pixel_bytes, run->end - run->first, run->value, pixel_bytes, may_overrun);
 }
 
 /* The pixels [first, end) hold `value`. */

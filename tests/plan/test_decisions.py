@@ -102,12 +102,12 @@ def bounds():
 
 
 def blending():
-    grounds = product((True, False), (4, 16))
+    grounds = (True, False, 4), (True, True, 4), (False, True, 4), (False, False, 16)
     return [
         rows
-        for lays, n_bytes in grounds
+        for lays, is_packed, n_bytes in grounds
         for rows in of_scenes(
-            lambda v, s: choices.rows_to_blend(v, s, n_bytes * v.size[0], lays_ground=lays),  # noqa: B023
+            lambda v, s: choices.rows_to_blend(v, s, n_bytes * v.size[0], lays_ground=lays, is_packed=is_packed),  # noqa: B023
             {},
             {"sampling": "area"},
         )
@@ -144,7 +144,7 @@ DECIDED = {
     "flat": (10752, 5238, "cae0f22b1ce82c8d"),
     "sorting": (64512, 7382, "3ed8e8a7b0759050"),
     "bounds": (10752, 3570, "1d9105453eb874e7"),
-    "blending": (86016, 71517, "00580d5c656b8030"),
+    "blending": (86016, 73728, "2003423b2f6b9e5a"),
     "colours": (10752, 4560, "783c5bea1de99436"),
     "labels": (21504, 8832, "e91fcc0b80ed6bba"),
     "split": (672, 289, "13a948a471d0955a"),

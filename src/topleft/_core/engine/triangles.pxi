@@ -314,7 +314,7 @@ cdef class SnappedMesh:
         """Blend the colours of triangles, in their order, into rows [first_row, first_row + n_rows) of a picture.
 
         `band_rows`: rows of a band, which is finished before the next. `ground`: the colour that the rows are cleared to,
-        or None. `packed`: room for the picture, for uint8 with other than 4 channels; `cells`: clear, for areas.
+        or None. `packed`: room for a band, for uint8 with other than 4 channels; `cells`: clear, for areas.
         Returns as `draw` does.
         """
         cdef tl_canvas canvas
@@ -328,7 +328,7 @@ cdef class SnappedMesh:
         canvas.blend, canvas.is_premultiplied, canvas.is_area = <tl_blend>blend, is_premultiplied, cells is not None
         canvas.band_rows = band_rows
         canvas.ground = &ground[0] if ground is not None else NULL
-        canvas.packed = &packed[first_row * width] if packed is not None else NULL
+        canvas.packed = &packed[0] if packed is not None else NULL
         canvas.cells = &cells[0] if cells is not None else NULL
         with nogil:
             bad_row = K.blend(&self.snapped, &window, &canvas)

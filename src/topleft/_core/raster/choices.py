@@ -408,10 +408,10 @@ def guess_scatter(view: View, work: Work) -> float:
     return work.mesh.guess_scatter(max(1, int(cost_table().far_pixels) // view.size[0]))
 
 
-def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool) -> int:
+def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool, is_packed: bool) -> int:
     """Return how many rows are blended before the next: a band that stays in the cache, where all are met again.
 
-    Each band looks at all triangles.
+    Each band looks at all triangles. `is_packed`: every pixel is unpacked in the end.
     """
     costs, (width, height) = cost_table(), view.size
     n_rows = max(1, int(costs.blend_bytes) // row_bytes)
@@ -420,12 +420,12 @@ def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool) 
     _, n_layers, n_triangle_rows = work.guess
     n_covered = n_layers * width * height
     again_ns = n_triangle_rows * costs.blended_row + n_covered * costs.blended_pixel
-    ground_ns = min(n_covered, width * height) * costs.blended_pixel if lays_ground else 0.0
+    n_again = width * height if is_packed else min(n_covered, width * height) if lays_ground else 0.0
     looked_ns = work.n_triangles * costs.blended_triangle + work.n_vertices * costs.blended_vertex
     cost_ns = height / n_rows * looked_ns
     if view.sampling is Sampling.AREA:
         cost_ns += n_triangle_rows / n_rows * costs.blended_strip
-    return n_rows if ground_ns + again_ns * guess_scatter(view, work) > cost_ns else height
+    return n_rows if n_again * costs.blended_pixel + again_ns * guess_scatter(view, work) > cost_ns else height
 
 
 class Route(Enum):
@@ -475,10 +475,10 @@ def fill_route(
     return FillRoute.SAMPLES if view.sampling.n_samples > 1 else FillRoute.LABELS
 
 
-def lays_ground(found: FillRoute, view: View, colors: NDArray[Any], *, is_flat: bool) -> bool:
+def lays_ground(found: FillRoute, view: View, *, is_flat: bool) -> bool:
     """Tell whether a way to fill gives pixels without a triangle their colour, too."""
     if found is FillRoute.BLENDED:
-        return colors.itemsize == 1 and view.sampling.n_samples == 1
+        return view.sampling.n_samples == 1
     if found in (FillRoute.SAMPLES, FillRoute.LABELS):
         return is_flat and (found is FillRoute.LABELS or can_slice(view))
     return found is not FillRoute.NOTHING

@@ -147,7 +147,7 @@ def draw_fill(
         route = choices.fill_route(
             view, snapped.work, palette, is_flat=is_flat, is_mixed=blending.is_needed, has_ground=ground is not None
         )
-        if ground is not None and not choices.lays_ground(route, view, palette, is_flat=is_flat):
+        if ground is not None and not choices.lays_ground(route, view, is_flat=is_flat):
             painting = painting.with_ground_laid()
         if route is FillRoute.SHAPES:
             fill_large_shapes(painting, blending)
@@ -282,7 +282,7 @@ def paint_samples(p: Painting) -> None:
 def blend(p: Painting, blending: Blending) -> None:
     """Blend coloured triangles; with several samples a pixel each sample is a picture.
 
-    A ground is there for uint8 with one sample a pixel.
+    A ground is there with one sample a pixel.
     """
     work, n_samples = p.snapped.work, p.view.sampling.n_samples
     n_threads = choices.threads_to_draw(p.view, work, Sink.LABEL)
@@ -293,8 +293,9 @@ def blend(p: Painting, blending: Blending) -> None:
         pictures = p.memory.scratch("sample colors", (n_samples, *p.pixels.shape), p.colors.dtype)
         pictures[...] = p.pixels
     row_bytes = (4 if p.is_u8 else 4 * p.n_channels) * p.view.size[0]
-    lays_ground = p.ground is not None
-    band_rows = choices.rows_to_blend(p.view, work, row_bytes, lays_ground=lays_ground)
+    band_rows = choices.rows_to_blend(
+        p.view, work, row_bytes, lays_ground=p.ground is not None, is_packed=p.is_u8 and p.n_channels != 4
+    )
     for mesh, picture in zip(meshes, pictures, strict=True):
         if blend_picture(p, mesh, picture, blending, n_threads, band_rows):
             p.snapped.refuse()
@@ -313,7 +314,8 @@ def blend_picture(
     height, width = pixels.shape[:2]
     n_parts, n_channels, is_u8 = min(height, n_threads), p.n_channels, p.is_u8
     flat, palette, under = engine.as_bytes(pixels), engine.as_bytes(p.colors), p.ground_bytes
-    packed = p.memory.scratch("packed", (width * height,), np.int32) if is_u8 and n_channels != 4 else None
+    shape = n_parts, min(band_rows, -(-height // n_parts)) * width
+    packed = p.memory.scratch("packed", shape, np.int32) if is_u8 and n_channels != 4 else [None] * n_parts
     n_cells = engine.blend_cells(width)
     cells = p.memory.constant("cells", n_parts * n_cells, engine.CELL_CLEAR) if blending.by_area else None
 
@@ -322,7 +324,7 @@ def blend_picture(
         own = None if cells is None else cells[n_cells * i : n_cells * (i + 1)]
         return mesh.blend(
             flat, width, first, end - first, palette, n_channels, is_u8, p.is_flat,
-            *blending.codes, band_rows, under, packed, own,
+            *blending.codes, band_rows, under, packed[i], own,
         )  # fmt: skip
 
     return max(run_parts(blend_part, n_parts, n_parts)) >= 0
