@@ -16,7 +16,6 @@
 #include "topleft.h"
 #include "lanes/lanes.h"
 #include "vertex/fixed.h"
-#include "sink/pixel_runs.c"
 #include "area/ramp.c"
 
 #define TL_SUM_MARGIN (1 << 20) /* rounding may give a few units less than 0 */
@@ -127,55 +126,6 @@ TL_INLINE int accumulate_narrow(const area_plane *plane, const tl_area *target, 
     return !vm_any(vi_gt(vi_set1(0), seen));
 }
 
-/* The next set bit of [k, end), or end. */
-TL_INLINE int64_t next_met(const uint64_t *met, int64_t k, int64_t end)
-{
-    while (k < end) {
-        const uint64_t rest = met[k >> 6] >> (k & 63);
-        if (rest)
-            return min64(k + __builtin_ctzll(rest), end);
-        k = (k | 63) + 1;
-    }
-    return end;
-}
-
-/* Accumulates the areas of a plane with bits of the cells that edges meet: the cells between them are written as runs,
- * unread. */
-TL_INLINE int accumulate_met(const area_plane *plane, const tl_area *target, int is_clamped)
-{
-    const int64_t stride = plane->stride, n_cols = plane->n_cols;
-    const int64_t n_lines = (n_cols + TL_MET_CELLS - 1) / TL_MET_CELLS;
-    open_run run = start_pixels(target->pixels, n_cols, plane->n_rows, target->stride_px);
-    vi seen = vi_set1(0);
-    for (int64_t row = 0; row < plane->n_rows; row++) {
-        int32_t *const cells = plane->cells + row * stride + TL_CELL_PAD;
-        const int64_t at = row * target->stride_px, line0 = (row * stride + TL_CELL_PAD) / TL_MET_CELLS;
-        vi carry = left_sum(cells - TL_CELL_PAD, &seen);
-        for (int64_t line = 0; line < n_lines; line++) {
-            const int64_t met = next_met(plane->met, line0 + line, line0 + n_lines) - line0;
-            if (met > line) {
-                float even[TL_LANES];
-                vf_store(even, area_of_sums(carry, is_clamped));
-                add_pixels(&run, at + line * TL_MET_CELLS, at + min64(met * TL_MET_CELLS, n_cols), (char *)even, 4);
-                line = met;
-            }
-            if (line == n_lines)
-                break;
-            close_run(&run, 4); /* it may overrun its end */
-            run.first = run.end;
-            const int64_t end = min64((line + 1) * TL_MET_CELLS, n_cols);
-            for (int64_t k = line * TL_MET_CELLS; k < end; k += TL_LANES) {
-                const vi sums = accumulate_lanes(cells + k, n_cols - k, &carry, &seen);
-                store_areas(target->pixels + at + k, n_cols - k, area_of_sums(sums, is_clamped));
-            }
-        }
-        for (int64_t col = n_cols / TL_LANES * TL_LANES; col < stride - TL_CELL_PAD; col += TL_LANES)
-            vi_store(cells + col, vi_set1(TL_CELL_ZERO));
-    }
-    close_run(&run, 4);
-    return !vm_any(vi_gt(vi_set1(0), seen));
-}
-
 static void accumulate_wide(const area_plane *plane, const tl_area *target)
 {
     for (int64_t row = 0; row < plane->n_rows; row++) {
@@ -201,9 +151,7 @@ static int accumulate(const area_plane *plane, const tl_area *target)
     }
     int32_t seen[4];
     v4_store(seen, plane->seen);
-    const int fits = plane->met           ? accumulate_met(plane, target, target->is_clamped)
-                     : target->is_clamped ? accumulate_narrow(plane, target, 1)
-                                          : accumulate_narrow(plane, target, 0);
+    const int fits = target->is_clamped ? accumulate_narrow(plane, target, 1) : accumulate_narrow(plane, target, 0);
     return fits && (seen[0] | seen[1] | seen[2] | seen[3]) >= 0;
 }
 

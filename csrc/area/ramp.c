@@ -35,8 +35,6 @@
 
 #define TL_WAITING_QUADS 256 /* 64 and 512 are slower */
 
-#define TL_MET_CELLS 16 /* a cache line: rows are whole lines */
-
 /* The cells of a window. */
 typedef struct {
     int32_t *cells;      /* (n_rows, stride), TL_CELL_ZERO if empty; or NULL */
@@ -47,7 +45,6 @@ typedef struct {
     int32_t top_fx, bottom_fx, left_fx, right_fx; /* the window's border, clamped for lanes */
     int bits;
     int is_sparse; /* most cells are met by no edge; for `accumulate` */
-    uint64_t *met; /* a bit for each TL_MET_CELLS cells: whether an edge has been added to them; or NULL */
     int n_waiting; /* quads to be added to cells [at, at + 4), in the order of vi_store_quads */
     int32_t at[TL_WAITING_QUADS], quads[4 * TL_WAITING_QUADS];
     v4 seen; /* bitwise or of all values that cells have had */
@@ -119,19 +116,6 @@ static inline edge_one setup_edge(const area_plane *plane, const edge_record *r)
     };
 }
 
-/* Sets the bits of cells [first, end). */
-TL_INLINE void note_met(uint64_t *met, int64_t first, int64_t end)
-{
-    for (int64_t k = first / TL_MET_CELLS; k <= (end - 1) / TL_MET_CELLS; k++)
-        met[k >> 6] |= 1ull << (k & 63);
-}
-
-static __attribute__((noinline)) void note_quads(const area_plane *plane, int n)
-{
-    for (int i = 0; i < n; i++)
-        note_met(plane->met, plane->at[i], plane->at[i] + 4);
-}
-
 /* Adds buffered quads to the cells.  The cells are scattered beyond the second-level cache: to compute first, prefetch
  * meanwhile and add later saves a third for 200,000 triangles of 8 px. */
 TL_ONCE void flush_quads(area_plane *plane)
@@ -139,8 +123,6 @@ TL_ONCE void flush_quads(area_plane *plane)
     const int n = plane->n_waiting;
     v4 seen = plane->seen;
     plane->n_waiting = 0;
-    if (plane->met)
-        note_quads(plane, n);
     for (int i = 0; plane->wide_cells && i < n; i++)
         for (int k = 0; k < 4; k++)
             plane->wide_cells[plane->at[i] + k] +=
@@ -266,8 +248,6 @@ TL_INLINE void add_wide_row(area_plane *plane, int64_t row, int64_t col, double 
     const int64_t at = row * plane->stride + TL_CELL_PAD + col;
     vi before = vi_set1(0);
     vi seen = before;
-    if (plane->met)
-        note_met(plane->met, at + first, at + end);
     for (int64_t k = first; k < end; k += TL_LANES) {
         const vd x = vd_add(vd_set1((double)k), vd_from_vi(vi_iota())), next = vd_add(x, one);
         const vd a = vd_min(vd_max(x, lo), hi), b = vd_min(vd_max(next, lo), hi);
@@ -341,8 +321,6 @@ static void add_exact_row(area_plane *plane, int64_t row, int64_t col, double lo
     const int64_t visible = min64(passed, plane->n_cols - col), end = max64(visible, first + 1);
     const int64_t at = row * plane->stride + TL_CELL_PAD + col;
     int32_t before = 0, seen = 0;
-    if (plane->met)
-        note_met(plane->met, at + first, at + end);
     for (int64_t k = first; k < end; k++) {
         const int32_t area = exact_area(k, low, high, steep, height);
         if (plane->wide_cells) {

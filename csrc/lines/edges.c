@@ -70,7 +70,7 @@ static int64_t list_edges(const tl_snapped *snapped, const tl_edge_scratch *scra
                           int64_t *n_edges)
 {
     const int64_t n_vertices = snapped->mesh.n_vertices;
-    int64_t *restrict starts = scratch->starts, n = 0, n_listed;
+    int64_t *restrict starts = scratch->starts, n = 0, n_listed = 0;
     int32_t *restrict highs = scratch->highs, *restrict last_low = scratch->last_low;
     memset(starts, 0, (size_t)(n_vertices + 1) * sizeof *starts);
     memset(last_low, 0xff, (size_t)n_vertices * sizeof *last_low);

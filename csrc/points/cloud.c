@@ -11,7 +11,6 @@
 #include <stdint.h>
 
 #include "topleft.h"
-#include "lanes/lanes.h"
 #include "vertex/fixed.h"
 
 /* The largest whole number with a square of at most a, 0 <= a <= 2^60. */
@@ -31,18 +30,16 @@ static inline void span_of(int64_t center, int64_t low, int64_t high, int64_t sa
     *last = min64((center + high - sample) >> shift, n - 1);
 }
 
-TL_INLINE void keep_span(const tl_target *target, int64_t at, int64_t n, float depth, int32_t id)
+/* Pixel by pixel: spans are short, and vectors gain 0.96 on the median of 26 scenes of 1,000 to 200,000 points of 1 to
+ * 64 px, AVX2 of a Zen 3. */
+static inline void keep_span(const tl_target *target, int64_t at, int64_t n, float depth, int32_t id)
 {
-    const vf z = vf_set1(depth);
-    float *depths = target->depth + at;
-    int32_t *ids = (int32_t *)target->pixels + at;
-    for (int64_t x = 0; x < n; x += TL_LANES) {
-        const vm inside = vm_first((int)min64(n - x, TL_LANES));
-        const vf there = vf_load_masked(inside, depths + x);
-        const vm wins = vm_and(inside, target->sink == TL_SINK_FARTHEST ? vf_lt(there, z) : vf_lt(z, there));
-        vf_store_masked(depths + x, wins, z);
-        vi_store_masked(ids + x, wins, vi_set1(id));
-    }
+    const int is_farthest = target->sink == TL_SINK_FARTHEST;
+    float *restrict depths = target->depth + at;
+    int32_t *restrict ids = (int32_t *)target->pixels + at;
+    for (int64_t x = 0; x < n; x++)
+        if (is_farthest ? depths[x] < depth : depth < depths[x])
+            depths[x] = depth, ids[x] = id;
 }
 
 /* Sets the distances along a row, low to high, of covered samples from the centre, for a row at distance y. */
