@@ -1,6 +1,7 @@
 """Voxels against layers, against an exact test of triangle and cube, and against volumes that are known."""
 
 import itertools
+import warnings
 from fractions import Fraction
 
 import numpy as np
@@ -143,6 +144,29 @@ def test_open_mesh_is_told_with_the_number_of_its_columns():
         found = tl.voxelize((vertices, triangles[np.abs(vertices[triangles][:, :, 2].mean(axis=1) - 1) > 1e-6]), 4)
     assert found.n_odd == 16
     assert not found.values.any()
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("samples", [1, 2])
+@pytest.mark.parametrize(
+    ("scale", "shift", "is_inside_out", "n_told"),
+    [
+        (1, (1, 0.5, 0.5), False, 24),  # 4 x 6 columns of four voxels have both cubes
+        (0.5, (0, 0, 0), False, 16),
+        (0.5, (0, 0, 0), True, 0),  # a cavity
+        (1, (0, 0, 2), False, 0),  # side by side
+        (1, (3, 0, 0), False, 0),
+    ],
+)
+def test_overlaps_of_shells_are_told(scale, shift, is_inside_out, n_told, samples, turned):
+    vertices, triangles = tl.scenes.cube()
+    second = triangles[:, ::-1] if is_inside_out else triangles
+    both = np.concatenate([triangles, second + len(vertices)])
+    mesh = tl.Mesh(np.concatenate([vertices, vertices * scale + shift]), both[:, ::-1] if turned else both)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        tl.voxelize(mesh, pitch=0.25, samples=samples)
+    assert [str(one.message).split()[0] for one in told] == [str(n_told * samples**2)] * bool(n_told)
 
 
 def test_scene_is_filled_where_any_of_its_instances_is():

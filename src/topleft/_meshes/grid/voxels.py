@@ -27,11 +27,14 @@ from topleft._core.raster.view import View
 from topleft._meshes.model.normals import moved
 from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.errors import MeshWarning
-from topleft.typing import VoxelRuleOption
+from topleft.typing import CullOption, VoxelRuleOption
 
 SAMPLES = (1, 2, 4, 8)
 MOST_ALONG = 1 << 14
 """Voxels, or samples of them, along an axis."""
+
+WORDS_AT_ONCE = 1 << 15
+"""Words of columns that are compared together: they stay in a cache."""
 
 U64 = npt.NDArray[np.uint64]
 
@@ -138,7 +141,8 @@ def voxelize(
     Warns
     -----
     MeshWarning
-        If columns of a solid cross the surface an odd number of times: it is not closed.
+        If columns of a solid cross the surface an odd number of times: it is not closed. If they enter it where they
+        are inside: shells of one mesh overlap, or its triangles do not all turn one way.
 
     Raises
     ------
@@ -177,17 +181,17 @@ def voxelize(
     if samples > 1:
         check_fits(grid.shape, np.float32)
         shares: npt.NDArray[np.float32] = FRESH.empty("voxels", grid.shape, np.float32)
-        bits, n_odd = solid_bits(grid, bodies, samples, n_threads)
+        bits, *told = solid_bits(grid, bodies, samples, n_threads)
         sample_bits = samples.bit_length() - 1
         run_parts(
             lambda first, end: engine.count_columns(bits, sample_bits, shares, first, end), len(shares), n_threads
         )
-        return with_warning(grid, shares, n_odd)
+        return with_warning(grid, shares, *told)
     check_fits(grid.shape, np.bool_)
     voxels: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
-    filled, n_odd = voxels.view(np.uint8), 0
+    filled, told = voxels.view(np.uint8), [0, 0]
     if solid:
-        bits, n_odd = solid_bits(grid, bodies, 1, n_threads)
+        bits, *told = solid_bits(grid, bodies, 1, n_threads)
         run_parts(lambda first, end: engine.expand_columns(bits, filled, first, end), len(filled), n_threads)
     else:
         filled[...] = 0
@@ -198,11 +202,15 @@ def voxelize(
             engine.touch_voxels(points, triangles, 0, len(triangles), filled)
         elif not solid:
             mark_surface(points, triangles, filled, n_threads)
-    return with_warning(grid, voxels, n_odd)
+    return with_warning(grid, voxels, *told)
 
 
-def with_warning(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int) -> Voxels:
-    """The result, with a warning where the mesh is not closed."""
+def with_warning(grid: VoxelGrid, values: npt.NDArray[Any], n_odd: int, n_nested: int) -> Voxels:
+    """The result, with a warning where a mesh is not closed, or shells of it overlap."""
+    if n_nested:
+        line = f"{n_nested} columns of voxels enter the mesh where they are inside: it is filled by the even-odd rule, "
+        line += "overlaps of its shells are holes; instances of a scene are filled one by one"
+        warnings.warn(line, MeshWarning, stacklevel=3)
     if n_odd:
         line = f"the mesh is not closed: {n_odd} columns of voxels cross it an odd number of times"
         warnings.warn(line, MeshWarning, stacklevel=3)
@@ -264,36 +272,62 @@ def counts_of(extent: F64, pitch: float) -> list[int]:
 
 def solid_bits(
     grid: VoxelGrid, bodies: list[tuple[npt.NDArray[Any], I32]], samples: int, n_threads: int
-) -> tuple[U64, int]:
-    """Bits of columns (X, Y, words) of the samples inside of any body, and how many columns are odd."""
+) -> tuple[U64, int, int]:
+    """Bits of columns (X, Y, words) of the samples inside of any body; how many columns are odd, how many nested."""
     union: U64 | None = None
-    n_odd = 0
+    n_odd = n_nested = 0
     for vertices, triangles in bodies:
         points = grid.to_voxels(vertices, samples)
         name = "columns of one" if union is not None else "columns"
-        bits, n = crossings(name, points, triangles, tuple(samples * n for n in grid.shape), n_threads, fills=True)
+        shape = tuple(samples * n for n in grid.shape)
+        bits, n = crossings(name, points, triangles, shape, n_threads, fills=True)
+        fronts, _ = crossings("columns of fronts", points, triangles, shape, n_threads, fills=False, cull="back")
         n_odd += n
+        n_nested += 0 if n else count_nested(bits, fronts)
         union = bits if union is None else np.bitwise_or(union, bits, out=union)
     assert union is not None  # a scene has an instance
-    return union, n_odd
+    return union, n_odd, n_nested
+
+
+def count_nested(bits: U64, fronts: U64) -> int:
+    """How many columns enter a body where they are inside, or leave it there: the fewer, as bodies may be inside out.
+
+    bits: of the columns, filled by parity; fronts: of the crossings of triangles seen from the front.
+    """
+    n_enter = n_leave = 0
+    n_rows = max(1, WORDS_AT_ONCE // max(1, bits[:1].size))
+    for first in range(0, len(bits), n_rows):
+        now, front = bits[first : first + n_rows], fronts[first : first + n_rows]
+        changed = now << np.uint64(1)
+        changed[..., 1:] |= now[..., :-1] >> np.uint64(63)
+        changed ^= now
+        changed &= front
+        n_enter += int((changed & now).any(axis=-1).sum())
+        n_leave += int((changed & ~now).any(axis=-1).sum())
+    return min(n_enter, n_leave)
 
 
 def crossings(
-    name: str, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int, *, fills: bool
-) -> tuple[U64, int]:
-    """Bits of the columns along the last axis of a grid: filled between crossings, or only the steps of crossings."""
+    name: str, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int, *, fills: bool,
+    cull: CullOption = "none",
+) -> tuple[U64, int]:  # fmt: skip
+    """Bits of the columns along the last axis of a grid: filled between crossings, or only the steps of crossings.
+
+    Of the triangles that are left by `cull`: the steps at which they change the bits that are filled.
+    """
     n_rows, n_columns, n_steps = shape
     size = (n_rows, n_columns, engine.column_words(n_steps))
     check_fits(size, np.uint64)
     bits: U64 = SCRATCH.empty(name, size, np.uint64)
-    view = View.parse((n_columns, n_rows), {"threads": n_threads})
+    is_set = not fills and cull == "none"  # the steps of crossings as they lie, not as they are filled from
+    view = View.parse((n_columns, n_rows), {"threads": n_threads, "cull": cull})
     seen = np.empty_like(points)
     seen[:, 0], seen[:, 1], seen[:, 2] = points[:, 1], points[:, 0], points[:, 2]
     snapped = snap_mesh(SCRATCH, seen, triangles, view, with_depth=True, out=None)
 
     def draw_rows(first: int, end: int) -> int:
         bits[first:end] = 0
-        if engine.draw_crossings(snapped.mesh, bits, n_steps, not fills, first, end) >= 0:
+        if engine.draw_crossings(snapped.mesh, bits, n_steps, is_set, first, end) >= 0:
             snapped.refuse()
         return engine.fill_columns(bits, first, end) if fills else 0
 
