@@ -210,6 +210,45 @@ def ramps(source: Source) -> None:
     need(x.error < Fraction(1, 2**36), f"x errs by {float(x.error):.3g} px")
 
 
+def areas(source: Source) -> None:
+    """The area right of an edge in a pixel is off by less than 0.501 units, three edges by less than 9e-8."""
+    u, whole = DOUBLE, 2 ** int(source.constant("area/ramp.c", "TL_AREA_BITS"))
+    longest = Fraction(2 ** int(source.constant("area/area.c", "TL_MAX_EDGE_BITS")))
+    for across in (Fraction(1, 2**16), Fraction(1), longest):  # px, of an edge that may be the longest downwards
+        off = 3 * u * (1 + u) * (across + 1)  # of x
+        steep = whole * longest / (2 * across)
+        # By the slopes of Q: `whole` of `low`; 0 of `high`, for 2 steep (high - low) is the height; and by squares.
+        q = whole * off + steep * (2 * off) ** 2
+        q += 8 * whole * ((1 + u) ** 6 - 1)  # six roundings of numbers up to 8 px
+        need(q < Fraction(1, 2**11), f"Q errs by {float(q):.3g} units")
+        need(2 * q + Fraction(1, 2) < Fraction(501, 1000), "an area errs by more than 0.501 units")
+    need(Fraction(3 * 501, 1000) / whole < Fraction(9, 10**8), "three edges err by more than 9e-8")
+
+
+def depth(source: Source) -> None:
+    """Depth by a plane errs by 25 u r of the largest difference of depths: by 2^-35 of the largest |z| unless a sliver.
+
+    r is the box over twice the area; differences of depths and of coordinates are at most 1, so d1 y2 - d2 y1 is, too.
+    """
+    u, slivers = DOUBLE, 2 ** int(source.constant("vertex/setup.c", "TL_SLIVER_BITS"))
+    corners = [
+        (1, 0),
+        (1, 1),
+        (0, 1),
+        (-1, 0),
+        (-1, -1),
+        (0, -1),
+    ]  # of pairs whose members and difference are at most 1
+    need(all(abs(a * d - b * c) <= 1 for (a, b), (c, d) in itertools.product(corners, repeat=2)), "a slope exceeds r")
+    product = ONE.rounded(u).times(ONE, u)  # a difference of depths, rounded, times an exact coordinate
+    slope = product.plus(product, u, 1).times(ONE.rounded(u), u)
+    part = slope.times(ONE, u)  # of x or of y
+    error = 2 * part.error + u * (1 + part.error)  # and the sum of z0 and the first part
+    need(error <= 25 * u, f"a depth errs by {float(error / u):.2f} u r")
+    sums = 2 * u * (1 + u)  # of the largest |z|
+    need(2 * error * slivers + sums <= Fraction(1, 2**35), "a depth errs by more than 2^-35 of the largest |z|")
+
+
 def weights(source: Source) -> None:
     """Weights of float64 edge functions: within 2^-36, and 2^-28 where w differs by 256 times."""
     guard = re.search(r"fabs\(\*area\) \* (0x\w+) >= box", source.text("pixels/weights_exact.c"))
@@ -302,6 +341,16 @@ def divisions(source: Source) -> None:
     need(Fraction(1, 2**9) < Fraction(1, 510), "a quotient by 255 may pass a middle")
     need(Fraction(256, 2**53) < Fraction(1, 2**32), "a quotient of sums may pass a middle")
     need(16 * 255 * 65536 < 2**29, "the sum of a pixel's samples exceeds 2^29")
+
+
+def lengths(source: Source) -> None:
+    """The lengths of matches in PNG files: each from 3 to 258 has one symbol and its extra bits."""
+    text = source.text("pixels/png.c")
+    least, bits = ([int(n) for n in re.search(rf"{name}\[29\] = {{([^}}]*)}}", text)[1].split(",")]  # type: ignore[index]
+                   for name in ("LENGTHS", "LENGTH_BITS"))  # fmt: skip
+    ends = [a + 2**b for a, b in zip(least, bits, strict=True)]
+    need(least[0] == 3 and least[-1] == 258 and bits[-1] == 0, "the first or the last length is another")
+    need(ends[:-2] == least[1:-1] and ends[-2] == 258 + 1, "a length has no symbol, or two")
 
 
 def lines(source: Source) -> None:
@@ -430,6 +479,8 @@ CLAIMS = (
     Claim("signs", "exact/sign.c", "*bound is its largest error (Shewchuk's A)", "rounding", shewchuk),
     Claim("weights", "pixels/weights_exact.c", "weights within 2^-36", "rounding", weights),
     Claim("ramps", "area/ramp.c", "x is off by less than 2^-36 px", "rounding", ramps),
+    Claim("areas", "area/ramp.c", "an area is off by less than 0.501 units of 2^-24 px^2", "rounding", areas),
+    Claim("depth", "vertex/setup.c", "steep that float64 would lose bits that float32 shows", "rounding", depth),
     Claim(
         "edge-functions",
         "vertex/fixed.h",
@@ -448,6 +499,7 @@ CLAIMS = (
     ),
     Claim("sums", "area/accumulate.c", "the overflow is detected", "range", sums_of_cells),
     Claim("divisions", "blend/mix_u8.c", "the least distance from the middle between two integers", "range", divisions),
+    Claim("lengths", "pixels/png.c", "The least length of each length symbol", "range", lengths),
     Claim("lines", "lines/lines.c", "product of two of these is below 2^126", "range", lines),
     Claim("bias", "raster/triangles_fixed.c", "left: dy < 0, top: dy = 0 and dx > 0; as one number", "logic", bias),
     Claim("one-owner", "vertex/fixed.h", "edge functions are evaluated doubled", "logic", one_owner),

@@ -121,8 +121,8 @@ static inline int clip_box(tl_triangle *t, const tl_window *window)
     return t->col0 < t->col1 && t->row0 < t->row1;
 }
 
-/* A triangle is a sliver when its box holds more than 2^12 times its area: the slopes of its depth plane are then so
- * steep that float64 would lose bits that float32 shows, and the exact weights are used. */
+/* A triangle is a sliver when its box holds more than 2^12 times twice its area: the slopes of its depth plane are then
+ * so steep that float64 would lose bits that float32 shows, and the exact weights are used. */
 #define TL_SLIVER_BITS 12
 
 /* The depth plane over the corners, per half sub-pixel.  The operations are those of `plane_lanes` in

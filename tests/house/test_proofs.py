@@ -18,6 +18,9 @@ PLANTED = {
     "a slack of quotients halved": ("float-rows", "raster/refine.c", "BAND 0x1.2p-19f", "BAND 0x1.2p-20f"),
     "a smaller bound of signs": ("signs", "exact/sign.c", "(3.0 + 16.0 * 0x1p-53)", "(3.0 - 16.0 * 0x1p-53)"),
     "slivers by float64": ("weights", "pixels/weights_exact.c", "0x1p12 >= box", "0x1p15 >= box"),
+    "slivers by planes": ("depth", "vertex/setup.c", "TL_SLIVER_BITS 12", "TL_SLIVER_BITS 16"),
+    "coarser areas": ("areas", "area/area.c", "TL_MAX_EDGE_BITS 14", "TL_MAX_EDGE_BITS 17"),
+    "a length left out": ("lengths", "pixels/png.c", "35, 43, 51", "35, 44, 51"),
     "a range doubled": ("edge-functions", "vertex/fixed.h", "TL_NARROW_LIMIT 0x1p30", "TL_NARROW_LIMIT 0x1p31"),
     "a larger box": ("lanes", "raster/state.h", "TL_MAX_BOX_PX 62 ", "TL_MAX_BOX_PX 64 "),
     "a bias turned": (
