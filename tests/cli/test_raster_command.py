@@ -152,7 +152,7 @@ def test_command_replaces_what_is_there_when_told_to(tmp_path, pair, capsys, nam
         (["-o", "a.zarr", "--size", "9x9", "--crs", "EPSG:25832"], "--crs is for .tif"),
         (["-o", "a.tif", "--size", "9x9", "--levels", "2"], "--levels is for .zarr"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--kind", "depth"], "give one of them"),
-        (["-o", "a.zarr", "--size", "9x9", "--nodata", "5"], "--nodata is for --values and .tif"),
+        (["-o", "a.zarr", "--size", "9x9", "--labels", "--nodata", "5"], "nodata must be no label, got 5"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--surface", "upper"], "--surface is for heights"),
         (["-o", "a.dzi", "--size", "9x9", "--uncompressed"], "--uncompressed is for .tif and .zarr"),
         (["-o", "a.zarr", "--size", "9x9", "--values", "speed"], "values must be a .npy file or a property of"),

@@ -206,7 +206,7 @@ def test_geotiff_in_pixels_and_with_y_down(tmp_path):
     down.to_geotiff(tmp_path / "b.tif", tile=64, overviews=False)
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         assert (33550 in file.pages[0].tags, file.pages[0].tags[42113].value) == (False, "7")
-        assert equal(file.asarray(), pixels[:])
+        assert equal(file.asarray(), np.where(pixels[:] == -1, 7, pixels[:]))
     with tifffile.TiffFile(tmp_path / "b.tif") as file:
         assert file.pages[0].tags[34264].value[5] == 1.0
         assert equal(file.asarray(), down[:])
@@ -518,7 +518,55 @@ def test_finished_raster_is_kept_when_it_goes_on(tmp_path, name):
 def test_geotiff_of_another_nodata_or_crs_is_another_one(tmp_path):
     raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16)
     with pytest.raises(ValueError, match=r"a\.tif is not of this raster"):
-        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, nodata=7, resume=True)
+        raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, nodata=-7, resume=True)
+
+
+NODATA = {"labels": -9999, "depth": -9999, "shares": -1, "field": 5e20, "height_map": -9999, "int16": 321, "rows": 9}
+KINDS_OF_NUMBERS = {**KINDS, "rows": {"kind": "fill", "values": np.arange(60) % 3, "dtype": np.int32}}
+
+
+@pytest.mark.parametrize("kind", NODATA)
+def test_outside_is_the_no_data_of_the_file_in_each_writer(tmp_path, kind):
+    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    rasterio = pytest.importorskip("rasterio", reason="rasterio is not installed")
+    options = KINDS_OF_NUMBERS[kind]
+    if kind in ("int16", "rows"):
+        options = {**options, "values": options["values"][:6]}
+    raster = tl.tiles(CORNER, GRID, window=64, **options)
+    nodata = NODATA[kind]
+    is_outside = ~tl.tiles(CORNER, GRID, window=64, kind="coverage")[:]
+    if kind == "shares":
+        is_outside = raster[:] == 0
+    wished = np.where(is_outside, np.asarray(nodata, raster.dtype), raster[:])
+    assert is_outside.any()
+    raster.to_geotiff(tmp_path / "a.tif", tile=16, nodata=nodata)
+    with rasterio.open(tmp_path / "a.tif") as found:
+        assert found.nodata == np.asarray(nodata, raster.dtype)
+        assert equal(found.read(1), wished)
+    changed = raster.with_nodata(nodata)
+    changed.to_zarr(tmp_path / "a.zarr")
+    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    assert found.fill_value == np.asarray(nodata, raster.dtype)
+    assert equal(found[:], wished)
+    assert equal(changed[:], wished)
+    assert changed.fingerprint != raster.fingerprint
+
+
+@pytest.mark.parametrize(
+    ("kind", "nodata", "said"),
+    [
+        ("labels", 5, "nodata must be no label, got 5 for 60 labels from 0 on"),
+        ("labels", 0.5, "nodata must be -1 or one int32, as pixels are, got 0.5"),
+        ("labels", 2**31, "nodata must be -1 or one int32"),
+        ("labels", float("nan"), "nodata must be -1 or one int32"),
+        ("coverage", -9999, "nodata must be False or one bool"),
+        ("colors", 7, r"nodata must be \[0, 0, 0\] or one uint8"),
+    ],
+)
+def test_no_data_that_pixels_do_not_hold_or_labels_have_is_refused(tmp_path, kind, nodata, said):
+    with pytest.raises(ValueError, match=said):
+        raster_of(kind).to_geotiff(tmp_path / "a.tif", tile=16, nodata=nodata)
+    assert not list(tmp_path.iterdir())
 
 
 def test_empty_file_and_folder_are_written_over(tmp_path):

@@ -73,11 +73,11 @@ def run_raster(options: argparse.Namespace) -> int:
         raise UsageError(f"--levels is for .zarr, got {path.name}")
     if options.uncompressed and not (is_tiff or is_zarr):
         raise UsageError(f"--uncompressed is for .tif and .zarr, got {path.name}")
-    if options.nodata is not None and not (is_tiff or options.values is not None):
-        raise UsageError("--nodata is for --values and .tif: other pixels without triangles are -1, NaN or 0")
     try:
         with ExitStack() as stack, complaining() as lacks:
             raster = raster_of(options)
+            if options.nodata is not None:
+                raster = raster.with_nodata(options.nodata)
             n_workers = options.threads or available_threads()
             client = None if options.dask is None else client_of(options.dask, n_workers, stack)
             written = write(raster, path, options, client)
@@ -110,8 +110,7 @@ def write(raster: Tiles, path: Location, options: argparse.Namespace, client: An
     assert isinstance(path, Path)
     if suffix == ".dzi":
         return raster.to_deepzoom(path, **how)
-    how |= {"nodata": options.nodata, "compression": compression(options, "deflate")}
-    return raster.to_geotiff(path, crs=options.crs, **how)
+    return raster.to_geotiff(path, crs=options.crs, compression=compression(options, "deflate"), **how)
 
 
 def compression(options: argparse.Namespace, usual: str) -> Any:
@@ -199,7 +198,7 @@ def add_raster_command(commands: Any) -> None:
     add("--kind", choices=DIRECT_KINDS, help="the content of pixels")
     add("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)
-    add("--nodata", type=whole_or_float, metavar="N", help="the background, in values and .tif")
+    add("--nodata", type=whole_or_float, metavar="N", help="the number of pixels where nothing is")
     add("--levels", type=positive, metavar="N", help="resolutions of a .zarr, each half as wide (1)")
     add("--uncompressed", action="store_true", help="store pixels as they are")
     add("--window", type=positive, default=WINDOW, metavar="N", help=f"side of a window ({WINDOW})")

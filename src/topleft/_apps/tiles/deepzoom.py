@@ -117,7 +117,7 @@ def fill_blanks(raster: WindowedRaster, store: DeepZoomStore, ground: U8) -> Non
 def painting(raster: WindowedRaster) -> Callable[[Array], U8]:
     """Return the function that makes colours of the pixels of a kind."""
     if raster.kind == "labels":
-        return label_colors
+        return lambda labels: label_colors(labels, raster.painter.empty)
     if raster.dtype == bool:
         return lambda mask: mask.view(np.uint8) * np.uint8(255)
     if raster.kind == "coverage":
@@ -154,13 +154,13 @@ def halved_colors(pixels: U8) -> U8:
     )
 
 
-def label_colors(labels: Array) -> U8:
+def label_colors(labels: Array, empty: int) -> U8:
     """A colour (H, W, 4) for each label, transparent for nothing."""
     names, at = np.unique(labels, return_inverse=True)
     palette = np.zeros((len(names), 4), np.uint8)
     palette[:, :3] = id_colors(names)
     palette[:, 3] = 255
-    palette[names < 0] = 0
+    palette[names == empty] = 0
     return palette[at.reshape(labels.shape)]
 
 

@@ -27,7 +27,7 @@ from topleft._apps.tiles.folders import MANIFEST, Folder, fingerprints_at, only_
 from topleft._apps.tiles.levels import Written, blocks_with_pixels, write_levels
 from topleft._apps.tiles.store import TileStore, Writing, begin, level_size, n_levels_to
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_number
+from topleft._core.base.arrays import as_count
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.options import check_choice
 from topleft._core.base.remote import as_location
@@ -127,8 +127,8 @@ def write_geotiff(
     geo = {} if raster.grid is None else geo_tags(own_crs, raster.grid.transform)
     dtype = np.dtype(np.uint8) if raster.dtype == bool else raster.dtype
     if nodata is not None:
-        as_number("nodata", nodata)
-    told = raster.painter.nodata if nodata is None else np.asarray(nodata).item()
+        raster = raster.with_nodata(nodata)
+    told = raster.painter.nodata
     n_levels = n_levels_to(raster.size, side) if overviews else 1
     if n_levels > 1 and any(w % (2 * side) and w < n for w, n in zip(window, raster.size, strict=True)):
         raise ValueError(f"window must have sides of whole pairs of tiles, of {2 * side} pixels, got {window}")

@@ -255,7 +255,8 @@ class Tiles(WindowedRaster):
         crs : str or int, optional
             The CRS of the grid: "EPSG:25832", or any other that has an EPSG code in pyproj.
         nodata : number, optional
-            The no-data value of the file; -1 for labels and NaN or `nodata` for fields and heights unless given.
+            The value of pixels where nothing is, and the no-data value of the file; unless given -1 for labels, NaN or
+            `nodata` for fields and heights.
         compression : {"deflate", "none"}
             How tiles are stored; with a predictor.
         tile : int

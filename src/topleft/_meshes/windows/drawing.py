@@ -129,6 +129,8 @@ class Painter:
     """The value of a pixel without triangles: a number, or one a channel."""
     nodata: float | None = field(init=False)
     """The number of pixels without data in a file, if there is one."""
+    outside: tuple[Any, Any] | None = field(default=None, init=False)
+    """The value that the verb gives a pixel without triangles, and the value that `with_nodata` puts there."""
     channels: tuple[int, ...] = field(init=False)
     low: float = field(default=np.inf, init=False)
     high: float = field(default=-np.inf, init=False)
@@ -148,6 +150,24 @@ class Painter:
         self.nodata = self.empty.item() if kind.has_nodata and not self.channels else None
         if kind.depth is not None and self.n_components == 2:
             self.low = self.high = 0.0
+
+    def with_nodata(self, nodata: float, nothing: Any) -> Painter:
+        """Return a painter that gives pixels without triangles a number; `nothing` as for `learn`."""
+        number = np.asarray(nodata).item()
+        with np.errstate(all="ignore"):
+            held = np.array(number).astype(self.dtype)[()]
+        is_there = np.all(self.empty == number) or (number != number and np.all(self.empty != self.empty))
+        if not is_there and (self.channels or not (self.dtype.kind == "f" or held == number)):
+            raise ValueError(f"nodata must be {self.empty.tolist()} or one {self.dtype}, as pixels are, got {nodata!r}")
+        found = copy(self)
+        if not is_there and "background" in self.kind.options:  # a value may be that of the background before
+            found.options = {**self.options, "background": number}
+            found.learn(nothing)
+        elif not is_there:
+            found.outside = (self.empty if self.outside is None else self.outside[0]), held
+            found.empty = held
+        found.nodata = number if self.channels else held.item()
+        return found
 
     @property
     def is_exact(self) -> bool:
@@ -204,7 +224,13 @@ class Painter:
 
     def window(self, payload: Payload, crop: Crop) -> Array:
         """Return the pixels (H, W) or (H, W, C) of a window, drawn or blank."""
-        return self.kind.draw(self, payload, crop) if len(payload.triangles) else self.blank(crop.size, crop.out)
+        if not len(payload.triangles):
+            return self.blank(crop.size, crop.out)
+        drawn = self.kind.draw(self, payload, crop)
+        if self.outside is not None:
+            empty, nodata = self.outside
+            drawn[np.isnan(drawn) if empty != empty else drawn == empty] = nodata
+        return drawn
 
 
 _rows = np.empty((0, 3), np.int32)

@@ -11,14 +11,15 @@ import itertools
 import os
 import pathlib
 from collections.abc import Callable, Iterator
+from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_pair, as_path, as_size
+from topleft._core.base.arrays import as_count, as_number, as_pair, as_path, as_size
 from topleft._core.base.grid import Extent, ExtentLike, Grid
 from topleft._core.base.options import check_choice
 from topleft._core.base.threads import available_threads, parse_threads
@@ -178,6 +179,16 @@ class WindowedRaster:
         """How many windows there are."""
         return self.tiling.n_rows * self.tiling.n_columns
 
+    def with_nodata(self, nodata: float) -> Self:
+        """Return the raster with a number where no triangle or polygon is, which files then have as that of no data."""
+        as_number("nodata", nodata)
+        found = copy(self)
+        found.painter = self.painter.with_nodata(nodata, self.triangles.corners(np.empty(0, np.int32)))
+        if self.kind == "labels" and 0 <= nodata < self.triangles.n_faces:
+            raise ValueError(f"nodata must be no label, got {nodata} for {self.triangles.n_faces} labels from 0 on")
+        found._fingerprint = None
+        return found
+
     @property
     def index(self) -> WindowIndex | AreaIndex:
         """Which triangles each window needs; computed at the first use."""
@@ -214,7 +225,15 @@ class WindowedRaster:
         """A hash of the mesh, the values, the options and the size of windows."""
         if self._fingerprint is None:
             painter = self.painter
-            words = (1, self.kind, self.size, self.window_size, self.grid, sorted(painter.options.items(), key=str))
+            words: tuple[object, ...] = (
+                1,
+                self.kind,
+                self.size,
+                self.window_size,
+                self.grid,
+                sorted(painter.options.items(), key=str),
+            )
+            words += () if painter.outside is None else (painter.outside,)
             values = None if painter.values is None else painter.values.array
             arrays = {"values": values, "faces": self.triangles.faces}
             self._fingerprint = fingerprint_of(self.triangles, arrays, words)
