@@ -6,7 +6,6 @@
 #define TL_GRAD_VALUES_C
 
 #include <stdint.h>
-#include <string.h>
 
 #include "topleft.h"
 #include "grad/grad.h"

@@ -42,7 +42,6 @@
  *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns; i are unsigned
  *   vf_load_pairs(base, i, c)    8 bytes at base + 8 * i[k], as columns
  *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns
- *   hm_, hf_, hi_, hd_      what short rows need, in half vectors of TL_HALF_LANES (0: no half vectors)
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
  *   vi_add_halves, vi_sub_halves    modulo 2^16
@@ -80,28 +79,21 @@ TL_INLINE int32_t int32_at(const int32_t *p, int32_t i)
 
 /* Where memory cannot be masked, a masked load takes a branch a lane.  An AVX2 masked load waits for its mask, and an
  * AVX2 masked store on AMD costs more than five times a load, a blend and a store. */
-#define TL_LOADS_WHOLE (TL_LANES == 4 || TL_LANES == 8)
-#define TL_STORES_WHOLE (TL_LANES == 4 || TL_LANES == 8)
+#define TL_MOVES_WHOLE (TL_LANES == 4 || TL_LANES == 8)
 #define TL_SOME(V, M, NUMBER)                                                    \
     TL_INLINE V V##_load_some(M m, const NUMBER *p, int has_room)                \
     {                                                                            \
-        return TL_LOADS_WHOLE && has_room ? V##_load(p) : V##_load_masked(m, p); \
+        return TL_MOVES_WHOLE && has_room ? V##_load(p) : V##_load_masked(m, p); \
     }                                                                            \
     TL_INLINE void V##_store_some(NUMBER *p, M m, V a, int has_room)             \
     {                                                                            \
-        if (TL_STORES_WHOLE && has_room)                                         \
+        if (TL_MOVES_WHOLE && has_room)                                          \
             V##_store(p, V##_select(m, a, V##_load(p)));                         \
         else                                                                     \
             V##_store_masked(p, m, a);                                           \
     }
 TL_SOME(vi, vm, int32_t)
 TL_SOME(vf, vm, float)
-#if TL_HALF_LANES
-TL_INLINE hi hi_load_some(hm m, const int32_t *p, int has_room) { return (void)has_room, hi_load_masked(m, p); }
-TL_INLINE hf hf_load_some(hm m, const float *p, int has_room) { return (void)has_room, hf_load_masked(m, p); }
-TL_INLINE void hi_store_some(int32_t *p, hm m, hi a, int has_room) { (void)has_room, hi_store_masked(p, m, a); }
-TL_INLINE void hf_store_some(float *p, hm m, hf a, int has_room) { (void)has_room, hf_store_masked(p, m, a); }
-#endif
 
 TL_INLINE int vi_compress(int32_t *p, vm m, vi a)
 {

@@ -13,7 +13,6 @@
 #define TL_MM(name) _mm256_##name
 #define TL_SI(name) _mm256_##name##_si256
 #define TL_FROM_SI(type) _mm256_castsi256_##type
-#define TL_HALF_LANES 0
 
 typedef __m256i vi;
 typedef __m256 vf;

@@ -13,7 +13,6 @@
 #define TL_MM(name) _mm512_##name
 #define TL_SI(name) _mm512_##name##_si512
 #define TL_FROM_SI(type) _mm512_castsi512_##type
-#define TL_HALF_LANES 8
 
 typedef __m512i vi;
 typedef __m512 vf;
@@ -154,31 +153,6 @@ TL_INLINE void store_half(tl_vertex *v, wd xy, wd z)
     _mm512_storeu_pd(v, _mm512_permutex2var_pd(xy, front, z));
     _mm512_storeu_pd(v + 4, _mm512_permutex2var_pd(xy, back, z));
 }
-/* Half vectors: a 64-byte load or store at any column crosses a cache line, of 32 bytes every other time. */
-typedef __m256i hi;
-typedef __m256 hf;
-typedef __m512d hd;
-typedef __mmask8 hm;
-TL_INLINE hm hm_and(hm a, hm b) { return a & b; }
-TL_INLINE hm hm_or(hm a, hm b) { return a | b; }
-TL_INLINE int hm_any(hm a) { return a != 0; }
-TL_INLINE hm hi_gt(hi a, hi b) { return _mm256_cmpgt_epi32_mask(a, b); }
-TL_INLINE hi hi_add(hi a, hi b) { return _mm256_add_epi32(a, b); }
-TL_INLINE hi hi_max(hi a, hi b) { return _mm256_max_epi32(a, b); }
-TL_INLINE hi hi_load_masked(hm m, const int32_t *p) { return _mm256_maskz_loadu_epi32(m, p); }
-TL_INLINE void hi_store_masked(int32_t *p, hm m, hi a) { _mm256_mask_storeu_epi32(p, m, a); }
-TL_INLINE hf hf_load_masked(hm m, const float *p) { return _mm256_maskz_loadu_ps(m, p); }
-TL_INLINE void hf_store_masked(float *p, hm m, hf a) { _mm256_mask_storeu_ps(p, m, a); }
-TL_INLINE hm hf_lt(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_LT_OQ); }
-TL_INLINE hm hf_eq(hf a, hf b) { return _mm256_cmp_ps_mask(a, b, _CMP_EQ_OQ); }
-TL_INLINE hi hi_lower(vi a) { return _mm512_castsi512_si256(a); }
-TL_INLINE hd hd_lower(vd a) { return a.lo; }
-/* as `sum_depth` in sink.c */
-TL_INLINE hf hf_sum_depth(double row, hd col)
-{
-    return _mm256_add_ps(_mm512_cvtpd_ps(_mm512_add_pd(_mm512_set1_pd(row), col)), _mm256_setzero_ps());
-}
-
 TL_INLINE vf vf_min_size(vf a, vf b) { return _mm512_range_ps(a, b, 10); } /* the lesser, without its sign */
 TL_INLINE vf vf_lookup(const float *table, vi i) { return _mm512_permutexvar_ps(i, _mm512_loadu_ps(table)); }
 TL_INLINE vi vi_lookup(const int32_t *table, vi i) { return _mm512_permutexvar_epi32(i, _mm512_loadu_si512(table)); }

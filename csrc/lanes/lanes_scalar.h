@@ -10,7 +10,6 @@
 #include "lanes/inline.h"
 
 #define TL_LANES 1
-#define TL_HALF_LANES 0
 
 typedef int32_t vi;
 typedef float vf;

@@ -22,7 +22,6 @@
 #include "lanes/inline.h"
 
 #define TL_LANES 4
-#define TL_HALF_LANES 0
 
 typedef int32_t vi __attribute__((vector_size(16)));
 typedef float vf __attribute__((vector_size(16)));

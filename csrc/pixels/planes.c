@@ -7,7 +7,6 @@
 #ifndef TL_PLANES_C
 #define TL_PLANES_C
 
-#include <math.h>
 #include <stdint.h>
 
 #include "topleft.h"

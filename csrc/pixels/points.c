@@ -7,7 +7,6 @@
 #ifndef TL_POINTS_C
 #define TL_POINTS_C
 
-#include <math.h>
 #include <stdint.h>
 #include <string.h>
 

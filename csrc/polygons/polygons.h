@@ -2,7 +2,6 @@
 #ifndef TOPLEFT_POLYGONS_H
 #define TOPLEFT_POLYGONS_H
 
-#include <stddef.h>
 #include <stdint.h>
 
 #define TL_POLYGON_PAD 16                   /* points after the last point, which may be read */

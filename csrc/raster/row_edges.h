@@ -15,7 +15,6 @@
 #define TL_ROW_EDGES_H
 
 #include <stddef.h>
-#include <stdint.h>
 
 #include "topleft.h"
 #include "lanes/lanes.h"

@@ -132,25 +132,10 @@ TL_INLINE void put_lanes(const tl_target *target, tl_sink sink, int64_t at, vm m
 /* Draws rows of a block of at most TL_BLOCK_COLS columns, in a mask TL_BIT_COLS; the depth of a sample is the sum of
  * its row's and its column's depth. */
 TL_INLINE void draw_block(const tl_target *target, tl_sink sink, const int32_t *bits, const double *z_row,
-                          int stride_of_rows, int64_t at, int n_rows, int is_half, const double *z_cols, int32_t id)
+                          int stride_of_rows, int64_t at, int n_rows, const double *z_cols, int32_t id)
 {
     const int64_t stride = target->stride_px;
     const vd z_col = vd_load(z_cols);
-    (void)is_half, (void)z_col;
-#if TL_HALF_LANES
-    if (is_half && sink_has_depth(sink) && sink != TL_SINK_PEEL) {
-        for (int row = 0; row < n_rows; row++, at += stride)
-            put_depths_half(target, sink, at, (hm)bits[row * stride_of_rows],
-                            hf_sum_depth(z_row[row * stride_of_rows], hd_lower(z_col)), hi_lower(vi_set1(id)));
-        return;
-    }
-    if (is_half && (sink == TL_SINK_COUNT || sink == TL_SINK_LABEL)) {
-        const hi number = hi_lower(vi_set1(stored_value(target, sink, id)));
-        for (int row = 0; row < n_rows; row++, at += stride)
-            put_numbers_half(target, sink, at, (hm)bits[row * stride_of_rows], number);
-        return;
-    }
-#endif
     for (int row = 0; row < n_rows; row++, at += stride) {
         unsigned drawn = (unsigned)bits[row * stride_of_rows];
         if (sink == TL_SINK_MASK) {
@@ -194,8 +179,8 @@ TL_INLINE void draw_middle(const tl_snapped *snapped, const tl_target *shared, c
             const vd x = vd_sub(vd_add(vd_set1(m->x[k] + col * m->step), ramp(m->step)), vd_set1(m->x0[k]));
             vd_store(z_cols + col, vd_mul(vd_set1(m->slope_x[k]), x));
         }
-        draw_block(&target, sink, &m->bits[0][k], &m->z[0][k], TL_MAX_LANES, (uint32_t)m->sample[k], size >> 16,
-                   (size & 0xffff) <= TL_HALF_LANES, z_cols, name_of(snapped, q->id[i + k]));
+        draw_block(&target, sink, &m->bits[0][k], &m->z[0][k], TL_MAX_LANES, (uint32_t)m->sample[k], size >> 16, z_cols,
+                   name_of(snapped, q->id[i + k]));
     }
 }
 
@@ -298,8 +283,7 @@ TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink,
         double z_cols[TL_LANES];
         vd_store(z_cols, depths_of_columns(g, r, k, col0, unit));
         vi_store(bits, in_block);
-        draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n,
-                   width <= TL_HALF_LANES, z_cols, id);
+        draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n, z_cols, id);
     }
 }
 

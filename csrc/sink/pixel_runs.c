@@ -8,7 +8,6 @@
 
 #include "topleft.h"
 #include "lanes/lanes.h"
-#include "vertex/fixed.h"
 
 /* n > 0 pixels of one value.  Vectors begin at multiples of their size, for a store across two cache lines takes twice
  * as long; `may_overrun`: it may write up to one vector past n; the caller overwrites that. */

@@ -71,34 +71,29 @@ TL_INLINE int sink_has_depth(tl_sink sink)
     return sink == TL_SINK_PAINT || sink == TL_SINK_NEAREST || sink == TL_SINK_FARTHEST || sink == TL_SINK_PEEL;
 }
 
-/* Writes ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Written for whole
- * vectors and, where they exist, half vectors.  Ids that are only stored are prefetched first: stores retire in order,
- * and one by one would wait for memory.  AVX-512, 200,000 triangles of 8 px in any order: 16 -> 12.6 ms, a mesh of
- * 100,000 3.5 -> 3.1.  On other sets the masked store loads them. */
-#define TL_PUT_DEPTHS(NAME, M, F, I, P)                                                              \
-    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, F depth, I id)       \
-    {                                                                                                \
-        int32_t *ids = (int32_t *)target->pixels + at;                                               \
-        const int has_room = at + TL_LANES <= target->n_samples;                                     \
-        M wins;                                                                                      \
-        if (TL_LANES == 16)                                                                          \
-            __builtin_prefetch(ids, 1);                                                              \
-        if (sink == TL_SINK_PAINT) {                                                                 \
-            wins = P##m_and(m, P##i_gt(id, P##i_load_some(m, ids, has_room)));                       \
-        } else {                                                                                     \
-            const F old = P##f_load_some(m, target->depth + at, has_room);                           \
-            const M equal = P##m_and(m, P##f_eq(depth, old));                                        \
-            wins = P##m_and(m, sink == TL_SINK_NEAREST ? P##f_lt(depth, old) : P##f_lt(old, depth)); \
-            if (__builtin_expect(P##m_any(equal), 0))                                                \
-                wins = P##m_or(wins, P##m_and(equal, P##i_gt(P##i_load_masked(equal, ids), id)));    \
-        }                                                                                            \
-        P##f_store_some(target->depth + at, wins, depth, has_room);                                  \
-        P##i_store_some(ids, wins, id, has_room);                                                    \
+/* Writes ids and depths of the lanes in m that win.  Depths of new samples are never NaN or -0.  Ids that are only
+ * stored are prefetched first: stores retire in order, and one by one would wait for memory.  AVX-512, 200,000
+ * triangles of 8 px in any order: 16 -> 12.6 ms, a mesh of 100,000 3.5 -> 3.1.  On other sets the masked store loads
+ * them. */
+TL_INLINE void put_buffers(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, vi id)
+{
+    int32_t *ids = (int32_t *)target->pixels + at;
+    const int has_room = at + TL_LANES <= target->n_samples;
+    vm wins;
+    if (TL_LANES == 16)
+        __builtin_prefetch(ids, 1);
+    if (sink == TL_SINK_PAINT) {
+        wins = vm_and(m, vi_gt(id, vi_load_some(m, ids, has_room)));
+    } else {
+        const vf old = vf_load_some(m, target->depth + at, has_room);
+        const vm equal = vm_and(m, vf_eq(depth, old));
+        wins = vm_and(m, sink == TL_SINK_NEAREST ? vf_lt(depth, old) : vf_lt(old, depth));
+        if (__builtin_expect(vm_any(equal), 0))
+            wins = vm_or(wins, vm_and(equal, vi_gt(vi_load_masked(equal, ids), id)));
     }
-TL_PUT_DEPTHS(put_buffers, vm, vf, vi, v)
-#if TL_HALF_LANES
-TL_PUT_DEPTHS(put_depths_half, hm, hf, hi, h)
-#endif
+    vf_store_some(target->depth + at, wins, depth, has_room);
+    vi_store_some(ids, wins, id, has_room);
+}
 
 /* Writes the lanes in m of a triangle. */
 TL_INLINE void put_depths(const tl_target *target, tl_sink sink, int64_t at, vm m, vf depth, int32_t id)
@@ -116,18 +111,13 @@ TL_INLINE int32_t stored_value(const tl_target *target, tl_sink sink, int32_t id
 }
 
 /* Adds to counts, or writes labels, in the lanes in m: `number` of each. */
-#define TL_PUT_NUMBERS(NAME, M, I, P)                                                                                \
-    TL_INLINE void NAME(const tl_target *target, tl_sink sink, int64_t at, M m, I number)                            \
-    {                                                                                                                \
-        int32_t *pixels = (int32_t *)target->pixels + at;                                                            \
-        const int has_room = at + TL_LANES <= target->n_samples;                                                     \
-        const I old = P##i_load_some(m, pixels, has_room);                                                           \
-        P##i_store_some(pixels, m, sink == TL_SINK_COUNT ? P##i_add(old, number) : P##i_max(old, number), has_room); \
-    }
-TL_PUT_NUMBERS(put_numbers, vm, vi, v)
-#if TL_HALF_LANES
-TL_PUT_NUMBERS(put_numbers_half, hm, hi, h)
-#endif
+TL_INLINE void put_numbers(const tl_target *target, tl_sink sink, int64_t at, vm m, vi number)
+{
+    int32_t *pixels = (int32_t *)target->pixels + at;
+    const int has_room = at + TL_LANES <= target->n_samples;
+    const vi old = vi_load_some(m, pixels, has_room);
+    vi_store_some(pixels, m, sink == TL_SINK_COUNT ? vi_add(old, number) : vi_max(old, number), has_room);
+}
 
 /* Writes labels to the samples of a word, when triangles are drawn from the last to the first: samples in `covered` are
  * final. */
