@@ -96,7 +96,7 @@ def samples_beside_one() -> Scenes:
 def layers_beside_picture() -> Scenes:
     """Each layer of a view beside its picture: a mesh of 70,000 triangles at 512x512; calls share nothing."""
     import topleft as tl
-    from topleft._meshes.picture.layers import LAYERS
+    from topleft._core.base.options import LAYER_NAMES
 
     size = (512, 512)
     vertices, triangles = tl.scenes.blob(70_000)
@@ -107,7 +107,7 @@ def layers_beside_picture() -> Scenes:
         "camera_to": replace(camera, view=tl.Camera.framing(mesh, aspect=1.0, azimuth_deg=40).view),
     }  # fmt: skip
     made: dict[str, Callable[[], object]] = {
-        name: partial(tl.render_layers, mesh, camera, size, layers=(name,), **options) for name in LAYERS
+        name: partial(tl.render_layers, mesh, camera, size, layers=(name,), **options) for name in LAYER_NAMES
     }
     values = {"own": vertices.astype(np.float32)}
     made["attribute of 3"] = partial(tl.render_layers, mesh, camera, size, layers=(), attributes=values, **options)

@@ -39,8 +39,7 @@ from topleft._meshes.model.points import Points
 from topleft._meshes.model.texture import Texture
 from topleft._meshes.picture import notebook
 from topleft._meshes.picture.fragments import SceneDepthLayers, SceneFragments
-from topleft._meshes.picture.render import rasterize_mesh, render
-from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.render import rasterize_mesh, render, shade
 from topleft._meshes.picture.silhouette import silhouette
 from topleft._meshes.plan.plan import Plan, plan
 from topleft._meshes.scene.adapt import as_mesh

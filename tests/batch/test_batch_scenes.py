@@ -15,9 +15,9 @@ from batch_jobs import BOX, CORNERS, EXECUTORS, FACES, SIZE, orbit, pictures, vi
 import topleft as tl
 from topleft._apps.batch import jobs
 from topleft._apps.batch import workers as crews
+from topleft._core.base.options import LAYER_NAMES
 from topleft._meshes.io import load as files
 from topleft._meshes.lod.levels import kept_levels
-from topleft._meshes.picture.layers import LAYERS
 from topleft._meshes.scene import adapt
 
 
@@ -210,7 +210,7 @@ def test_batch_layers_flow_to_the_camera_of_the_options():
 
 
 def test_batch_layers_are_those_without_kept_memory():
-    names = [name for name in LAYERS if name not in ("uv", "flow")]
+    names = [name for name in LAYER_NAMES if name not in ("uv", "flow")]
     options = {"sampling": "msaa4", "shading": "flat", "cull": "back"}
     listed = [tl.Job(BOX, camera, SIZE, options, None, names) for camera in orbit(BOX, 3)]
     for result, camera in zip(list(tl.render_batch(listed)), orbit(BOX, 3), strict=True):

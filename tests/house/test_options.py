@@ -13,14 +13,12 @@ import topleft.typing as words
 from topleft._apps.tiles import geotiff, zarr_files
 from topleft._core.base import options
 from topleft._core.raster.view import ViewOptions
-from topleft._meshes.picture.layers import LAYERS
 from topleft._meshes.plan.plan import OUTPUTS
 from topleft._meshes.windows.drawing import KINDS
 from topleft.methods import ALIASES, CLASSICS, METHODS
 
 #: What the code takes; the others are read by the code itself, see `test_words_of_the_rest_are_taken_and_no_others`.
 TAKEN = {
-    "LayerOption": LAYERS,
     "MethodOption": [*METHODS, *ALIASES, *CLASSICS],
     "OutputOption": OUTPUTS,
     "RasterKindOption": KINDS,
@@ -47,6 +45,7 @@ READ = {
     "DepthTestOption": lambda word: tl.rasterize(*FLAT, 4, depth_test=word),
     "EncodingOption": lambda word: tl.Texture([[0]], encoding=word),
     "FilterOption": lambda word: tl.Texture([[0]], filter=word),
+    "LayerOption": lambda word: tl.render_layers(SQUARE, size=4, layers=word, camera_to=tl.Camera.framing(SQUARE)),
     "LightKindOption": lambda word: tl.Light((0, 0, 1), word, direction=(0, 0, -1) if word == "spot" else None),
     "OnErrorOption": lambda word: tl.render_batch([], on_error=word),
     "OrderOption": lambda word: tl.render_batch([], order=word),

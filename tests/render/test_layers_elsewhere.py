@@ -8,8 +8,8 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FLOAT32, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
+from topleft._core.base.options import LAYER_NAMES
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture.layers import LAYERS
 
 # Lenses
 
@@ -76,7 +76,7 @@ def test_glass_through_a_lens_is_refused():
 
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
 def test_layers_in_kept_memory_are_those_without(sampling):
-    names = [name for name in LAYERS if name not in ("uv", "flow")]
+    names = [name for name in LAYER_NAMES if name not in ("uv", "flow")]
     alone = look(CAMERAS["perspective"], *names, subject=SPHERE, sampling=sampling)
     kept = tl.Rasterizer(SIZE)
     for order in (names, names[::-1]):

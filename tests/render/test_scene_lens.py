@@ -8,7 +8,7 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FRONT, LENSES, SIZE, SNAP_PX, SPHERE, look, pierced, pixels, scene
 
 import topleft as tl
-from topleft._meshes.picture.layers import LAYERS
+from topleft._core.base.options import LAYER_NAMES
 
 ON_EACH_LENS = pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
 STRAIGHT = CAMERAS["off-centre"]
@@ -36,7 +36,7 @@ def test_scene_shows_the_nearest_of_its_instances(lens, sampling):
 @ON_EACH_LENS
 def test_scene_of_one_is_the_mesh(lens):
     camera, one = replace(STRAIGHT, lens=lens), tl.Scene([SPHERE])
-    names = [name for name in LAYERS if name != "uv"]
+    names = [name for name in LAYER_NAMES if name != "uv"]
     a, b = (look(camera, *names, subject=subject, camera_to=CAMERAS["perspective"]) for subject in (SPHERE, one))
     for name in names:
         assert_same(np.nan_to_num(b[name]), np.nan_to_num(a[name]))

@@ -6,9 +6,9 @@ from comparing import assert_same
 from layer_views import CAMERAS, CUBE, FLOAT32, ON_EACH_CAMERA, SIZE, SNAP_PX, SPHERE, look, pixels, scene
 
 import topleft as tl
+from topleft._core.base.options import LAYER_NAMES
 from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture.gbuffer import GBuffer
-from topleft._meshes.picture.layers import LAYERS
+from topleft._meshes.picture.layers import MeshLayers
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.view_layers import render_layers
 
@@ -222,19 +222,17 @@ def test_uv_and_attributes_are_interpolated():
 
 
 def test_only_what_is_asked_for_is_computed():
-    gbuffer = GBuffer(Shot.of(CUBE, CAMERAS["perspective"], SIZE))
-    assert "frags" not in vars(gbuffer)
-    for name in ("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"):
-        LAYERS[name](gbuffer)
-    assert "parts" not in vars(gbuffer)
-    for name in ("camera_normal", "world_normal"):
-        LAYERS[name](gbuffer)
-    assert "points" not in vars(gbuffer.parts[0])
+    layers = MeshLayers(Shot.of_meshes(CUBE, CAMERAS["perspective"], SIZE))
+    assert "frags" not in vars(layers)
+    layers.draw(("color", "alpha", "silhouette", "depth", "triangle", "instance", "barycentric"))
+    assert "parts" not in vars(layers)
+    layers.draw(("camera_normal", "world_normal"))
+    assert "points" not in vars(layers.parts[0])
 
 
 @pytest.mark.parametrize("size", [(0, 3), (3, 0)])
 def test_empty_picture_has_its_shapes(size):
-    names = [name for name in LAYERS if name != "uv"]
+    names = [name for name in LAYER_NAMES if name != "uv"]
     for subject in (CUBE, scene()):
         found = render_layers(subject, CAMERAS["perspective"], size, layers=names, camera_to=CAMERAS["perspective"])
         for name in names:

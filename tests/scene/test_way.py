@@ -65,4 +65,4 @@ def test_samples_of_a_mesh_are_drawn_once_where_they_are_returned():
 
 def test_pictures_tell_kinds_apart_where_they_come_in_alone():
     lines = [line for path in Path(ROOT, "_meshes/picture").glob("*.py") for line in path.read_text().splitlines()]
-    assert sum("isinstance(" in line for line in lines) <= 10
+    assert sum("isinstance(" in line or "cloud is not None" in line for line in lines) <= 14  # 22 in one class of shot

@@ -13,7 +13,7 @@ from engine_cases import hashes_on_each_isa
 
 import topleft as tl
 from topleft._core.base.color import srgb_tables
-from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.render import shade
 
 SIZE = (150, 110)
 RNG = np.random.default_rng(6)

@@ -8,7 +8,7 @@ from comparing import assert_same
 from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
-from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.render import shade
 from topleft._meshes.picture.shade import ShownInstance, shade_normals
 
 SIZE = (150, 70)

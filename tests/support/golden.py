@@ -13,7 +13,7 @@ from typing import get_args
 import numpy as np
 
 import topleft as tl
-from topleft._meshes.picture.layers import LAYERS
+from topleft._core.base.options import LAYER_NAMES
 from topleft.testing import HARD_SCENES, SIZE, hard_scenes, words_of
 from topleft.typing import SamplesOption
 
@@ -64,7 +64,7 @@ def layers(threads: int) -> Iterator[tuple[str, np.ndarray]]:
     vertices, triangles = tl.scenes.shape("octahedron")
     uv = np.arange(2 * len(vertices), dtype=np.float32).reshape(-1, 2) / 8
     mesh = tl.Mesh(vertices, triangles, uv=uv)
-    names = [name for name in LAYERS if name != "flow"]  # which needs two cameras
+    names = [name for name in LAYER_NAMES if name != "flow"]  # which needs two cameras
     for sampling in ("center", "msaa4"):
         frags = tl.rasterize_mesh(mesh, camera, SIZE, sampling=sampling, threads=threads)
         yield f"mesh triangle {sampling}", frags.triangle

@@ -14,8 +14,7 @@ from topleft._meshes.camera.matrices import (
 from topleft._meshes.lod.levels import keep_levels
 from topleft._meshes.lod.simplify import levels_of
 from topleft._meshes.model.pose import as_pose
-from topleft._meshes.picture.layers import draw_layers
-from topleft._meshes.picture.view_layers import gbuffer_of
+from topleft._meshes.picture.view_layers import layers_of
 
 __all__ = [
     "CameraLike",
@@ -23,13 +22,12 @@ __all__ = [
     "as_pose",
     "bounding_sphere",
     "box_corners",
-    "draw_layers",
     "ends_to_frame",
     "frame_of_sphere",
-    "gbuffer_of",
     "isa_available",
     "isa_in_use",
     "keep_levels",
+    "layers_of",
     "levels_of",
     "orbit_view",
     "sample_positions",

@@ -23,7 +23,7 @@ from topleft._core.base.notes import listening, tell
 from topleft._core.base.options import check_layers
 from topleft._core.base.remote import Location, as_location, location_of
 from topleft.annex.files import layer_paths, save_layers
-from topleft.annex.pictures import draw_layers, gbuffer_of
+from topleft.annex.pictures import layers_of
 from topleft.typing import LayerOption
 
 CameraMaker = Callable[[Any, tuple[int, int]], Camera]
@@ -254,11 +254,11 @@ class JobRunner:
                 return picture
             save_image(files[0], picture, background=_opaque(options))
             return None
-        gbuffer = gbuffer_of(scene, camera, size, rasterizer=rasterizer, **options)
-        arrays = draw_layers(layers, gbuffer)
+        view = layers_of(scene, camera, size, rasterizer=rasterizer, **options)
+        arrays = view.draw(layers)
         if job.destination is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
-        matrix = None if gbuffer.shot.camera.lens is not None else gbuffer.shot.camera.clip_from_world(size)
+        matrix = None if view.shot.camera.lens is not None else view.shot.camera.clip_from_world(size)
         save_layers(job.destination, arrays, matrix=matrix, background=_opaque(options))
         return None
 

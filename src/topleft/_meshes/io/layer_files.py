@@ -1,6 +1,6 @@
 """Layers to files: as they are where the format holds them, as scaled integers in PNG.
 
-Input: arrays by name, from `draw_layers`. Output: a file for each, or one .npz.
+Input: arrays by name, from `render_layers`. Output: a file for each, or one .npz.
 
 In a PNG a layer that is no picture holds whole numbers, and its text chunks tell their meaning:
 

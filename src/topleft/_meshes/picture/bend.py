@@ -140,10 +140,10 @@ class BentMesh:
             keep_corner_normals(made, CornerNormals(table, of_corner, made.triangles.ravel()))
         return made
 
-    def outline(self, projection: F64, cull: str) -> npt.NDArray[np.intp]:
+    def outline(self, projection: F64, cull: str, mask: npt.NDArray[np.bool_] | None) -> npt.NDArray[np.intp]:
         """The parts of the edges of the mesh as triangles (N, 3) without area, each edge once, for `wireframe`.
 
-        `cull` leaves out the edges that only culled triangles have.
+        `cull` and `mask`, of triangles of the mesh, leave out the edges that no other triangles have.
         """
         x, y = engine.product(self.points_eye[:, :2] / -self.points_eye[:, 2:], projection[:2, :2].T)[self.triangles].T
         area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0])
@@ -156,7 +156,10 @@ class BentMesh:
             first = np.empty(len(same), np.intp)
             first[same[::-1]] = np.arange(len(same))[::-1]
             places = first[same][self.triangles]
-        is_drawn &= (area * sign > 0 if sign else np.ones(len(area), bool))[:, None]
+        if sign:
+            is_drawn &= (area * sign > 0)[:, None]
+        if mask is not None:
+            is_drawn &= mask[self.source][:, None]
         ends = np.stack([places, np.roll(places, -1, axis=1)], axis=-1)[is_drawn]
         ends = np.unique(np.sort(ends, axis=1), axis=0)
         return ends[:, [0, 1, 1]]

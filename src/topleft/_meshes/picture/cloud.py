@@ -5,6 +5,7 @@ Input: `Points`, a camera. Output: `PointFragments`, a picture (H, W, 4) uint8.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -29,50 +30,51 @@ NOWHERE_PX = 1e12
 """The place of points that a lens does not see: outside of every window."""
 
 
-def draw_cloud(
-    cloud: Points, camera: Camera, size: tuple[int, int], *, depth_test: str | None = "less", **options: Any
-) -> PointFragments:
-    """The visibility buffer of a cloud; options as of `points`, a `ValueError` for those without a meaning."""
-    if depth_test != "less":
-        raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
-    if options.get("cull") not in (None, "none"):
-        raise ValueError("points have no side to cull")
-    frame = options.get("viewport") or size
-    positions: npt.NDArray[Any] = cloud.positions
-    sizes: float | F64 = cloud.size
-    if camera.lens is None:
-        options["transform"] = camera.clip_from_world(frame)
-    if camera.lens is not None or cloud.unit != "px":
-        eye = moved(positions, camera.view)
-        bent = eye if camera.lens is None else camera.lens.bend(eye)
-        projection = camera.clip_from_eye(frame)
-        if cloud.unit != "px":
-            unit_of_eye = abs(engine.determinant(camera.view[:3, :3])) ** (1 / 3)
-            scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
-            sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
-        if camera.lens is not None:
-            positions = through_lens(eye, bent, camera.lens, projection, frame)
-    view = View.parse(size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
-    refuse_many(view, "a cloud")
-    view.refuse_classic("points")
-    return draw_points(FRESH, positions, sizes, cloud.shape, view)
+@dataclass(frozen=True, eq=False)
+class CloudShot:
+    """A cloud of points and its camera: what `Shot` is of meshes."""
 
+    cloud: Points
+    camera: Camera
+    size: tuple[int, int]
 
-def render_cloud(
-    cloud: Points, camera: Camera, size: tuple[int, int], view: dict[str, Any], options: ShadingOptions, *, edges: bool
-) -> U8:
-    """The picture (H, W, 4) of a cloud, as `render` draws it."""
-    if edges:
-        raise ValueError("points have no edges")
-    frags = draw_cloud(cloud, camera, size, **view)
-    return shade_cloud(frags, cloud, camera, options)
+    def draw(self, *, depth_test: str | None = "less", **options: Any) -> PointFragments:
+        """The visibility buffer; options as of `points`, a `ValueError` for those without a meaning."""
+        if depth_test != "less":
+            raise ValueError(f"points are drawn with depth_test 'less', got {depth_test!r}")
+        if options.get("cull") not in (None, "none"):
+            raise ValueError("points have no side to cull")
+        cloud, camera, frame = self.cloud, self.camera, options.get("viewport") or self.size
+        positions: npt.NDArray[Any] = cloud.positions
+        sizes: float | F64 = cloud.size
+        if camera.lens is None:
+            options["transform"] = camera.clip_from_world(frame)
+        if camera.lens is not None or cloud.unit != "px":
+            eye = moved(positions, camera.view)
+            bent = eye if camera.lens is None else camera.lens.bend(eye)
+            projection = camera.clip_from_eye(frame)
+            if cloud.unit != "px":
+                unit_of_eye = abs(engine.determinant(camera.view[:3, :3])) ** (1 / 3)
+                scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
+                sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
+            if camera.lens is not None:
+                positions = through_lens(eye, bent, camera.lens, projection, frame)
+        view = View.parse(self.size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
+        refuse_many(view, "a cloud")
+        view.refuse_classic("points")
+        return draw_points(FRESH, positions, sizes, cloud.shape, view)
 
+    def render(self, view: dict[str, Any], look: ShadingOptions, *, edges: bool) -> U8:
+        """The picture (H, W, 4) of `render`."""
+        if edges:
+            raise ValueError("points have no edges")
+        return shade_cloud(self.draw(**view), self.cloud, self.camera, look)
 
-def draw_share(cloud: Points, camera: Camera, size: tuple[int, int], **options: Any) -> npt.NDArray[Any]:
-    """Where points are, (H, W): bool, or of several samples a pixel the share, float32; options as for `draw_cloud`."""
-    frags = draw_cloud(cloud, camera, size, **options)
-    is_seen = frags.samples_triangle >= 0
-    return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
+    def share(self, **options: Any) -> npt.NDArray[Any]:
+        """Where points are, (H, W): bool, or of several samples a pixel the share, float32; options as for `draw`."""
+        frags = self.draw(**options)
+        is_seen = frags.samples_triangle >= 0
+        return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
 
 
 def through_lens(eye: F64, bent: F64, lens: Lens, projection: F64, frame: tuple[int, int]) -> F64:

@@ -232,12 +232,9 @@ def in_order(placed: Placed, some: NDArray[np.intp], sink: Sink) -> NDArray[np.i
 
 def front_to_back(scene: Scene, clip_from_world: NDArray[np.float64], some: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the order of some instances by the distance of the middle of their boxes: by w, or z if w is constant."""
-    boxes = np.empty((len(scene), 6))
-    for mesh, at in scene.meshes.values():
-        boxes[at] = mesh.vertex_box
+    boxes, transforms = scene.boxes[some], scene.transforms[some]
     middles = 0.5 * (boxes[:, :3] + boxes[:, 3:])
-    transforms = scene.transforms[some]
-    middles = (transforms[:, :3, :3] * middles[some][:, None]).sum(axis=2) + transforms[:, :3, 3]
+    middles = (transforms[:, :3, :3] * middles[:, None]).sum(axis=2) + transforms[:, :3, 3]
     row = clip_from_world[3] if clip_from_world[3, :3].any() else clip_from_world[2]
     return np.argsort(engine.product(middles, row[:3]), kind="stable")
 

@@ -1,6 +1,6 @@
 """Draws the edges of triangles over a picture, where its visibility buffer does not hide them.
 
-Input: a picture (H, W, 4) uint8, `Fragments`, the `Mesh` or `Scene` and the `Camera` they were made with.
+Input: a picture (H, W, 4) uint8, its `Fragments`, and the `Placed` that they were drawn from.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.array_types import F64
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import wireframe
-from topleft._meshes.camera.camera import Camera
-from topleft._meshes.picture.bend import bend
+from topleft._meshes.picture.placed import Mask, Placed
 from topleft._meshes.picture.shade import ShadingOptions
-from topleft._meshes.scene.scene import Instance, Scene
+from topleft._meshes.scene.scene import Instance
 from topleft.typing import CullOption
 
 EDGE_COLOR = (24, 28, 40)
@@ -26,23 +26,26 @@ TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 def draw_all_edges(
     picture: npt.NDArray[np.uint8],
     frags: Fragments,
-    scene: Scene,
-    camera: Camera,
+    placed: Placed,
     options: ShadingOptions,
     *,
     cull: CullOption | None,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
     behind = depth_behind(frags.depth)
-    for instance in scene:
-        own_camera = camera.placed(instance.transform)
-        vertices, triangles = instance.mesh.vertices, instance.mesh.triangles
-        is_single = None if cull is not None else instance.mesh.single_sided(options.material or instance.material)
-        kinds = [(triangles, cull_of(cull or "none", instance))]
+    for i, instance in enumerate(placed.whole):
+        mesh = instance.mesh
+        is_single = None if cull is not None else mesh.single_sided(options.material or instance.material)
+        sides: list[tuple[Mask | None, CullOption]] = [(None, cull_of(cull or "none", instance))]
         if is_single is not None:  # single-sided triangles have edges on their fronts alone
-            kinds = [(triangles[is_single == 0], "none"), (triangles[is_single == 1], cull_of("back", instance))]
-        for some, side in kinds:
-            draw_edges(picture, behind, vertices, some, own_camera, cull=side, threads=options.threads)
+            sides = [(is_single == 0, "none"), (is_single == 1, cull_of("back", instance))]
+        for mask, side in sides:
+            vertices, transform = mesh.vertices, placed.clip_from_objects[i]
+            triangles: npt.NDArray[Any] = mesh.triangles if mask is None else mesh.triangles[mask]
+            if placed.bent is not None:
+                vertices, transform = placed.bent[i].points_eye, placed.clip_from_world
+                triangles, side = placed.bent[i].outline(transform, side, mask), "none"
+            draw_edges(picture, behind, vertices, triangles, transform, side, threads=options.threads)
 
 
 def cull_of(cull: CullOption, instance: Instance) -> CullOption:
@@ -55,18 +58,13 @@ def draw_edges(
     depth: npt.NDArray[np.float32],
     vertices: npt.NDArray[Any],
     triangles: npt.NDArray[Any],
-    camera: Camera,
-    *,
+    transform: F64,
     cull: CullOption,
+    *,
     threads: int | None,
 ) -> None:
     """Draw the edges of triangles over the picture (H, W, 4), where they are not behind a depth (H, W)."""
-    height, width = depth.shape
-    size = width, height
-    transform = camera.clip_from_world(size) if camera.lens is None else camera.clip_from_eye(size)
-    if camera.lens is not None:
-        bent = bend(vertices, triangles, camera, camera.lens, size)
-        vertices, triangles, cull = bent.points_eye, bent.outline(transform, cull), "none"
+    size = depth.shape[::-1]
     lines = wireframe(
         vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull,
         threads=threads,

@@ -269,7 +269,7 @@ def object_masks(
     """
     if not 0 <= as_number("beyond", beyond) < np.inf:
         raise ValueError(f"beyond must be a number of pictures, 0 or more, got {beyond}")
-    shot = Shot.of(scene, camera, size, takes_points=False)
+    shot = Shot.of_meshes(scene, camera, size)
     if beyond * max(shot.size) > MOST_BEYOND_PX:
         raise ValueError(f"beyond must reach at most {MOST_BEYOND_PX} pixels, got {beyond} pictures of {shot.size}")
     whole, (width, height) = shot.scene, shot.size
@@ -301,7 +301,7 @@ def object_masks(
 
 def seen_in(scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any]) -> tuple[I32, I32]:
     """Which instance shows (H, W), without the holes of materials, and the boxes of pixels round each (N, 4)."""
-    return cast(SceneFragments, draw_visible(Shot(scene, None, camera, size), **options))._found
+    return cast(SceneFragments, draw_visible(Shot(scene, camera, size), **options))._found
 
 
 def window_of(instance: Instance, camera: Camera, size: tuple[int, int], canvas: Window) -> Window:

@@ -17,36 +17,37 @@ from topleft._meshes.camera.camera import Camera, CameraLike, camera_for
 from topleft._meshes.lod.detail import detailed
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.points import Points
-from topleft._meshes.scene.scene import IN_PLACE, Scene, as_meshes, as_subject, scene_of
-
-NOTHING = Scene([IN_PLACE])
-"""The scene of a cloud, which has points alone."""
+from topleft._meshes.picture.cloud import CloudShot
+from topleft._meshes.scene.scene import Scene, as_meshes, as_subject, scene_of
 
 UNSHARED: AbstractContextManager[Memory] = nullcontext(FRESH)
 
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """The subject and the camera: a `cloud` of points, or else a `scene`; a mesh alone is a scene of one instance."""
+    """A scene and its camera; a mesh alone is a scene of one instance. Points have a `CloudShot`."""
 
     scene: Scene
-    cloud: Points | None
     camera: Camera
     size: tuple[int, int]
     is_mesh: bool = False
 
     @classmethod
-    def of(
-        cls, given: MeshLike | Scene | Points, camera: CameraLike | None, size: object, *, takes_points: bool = True
-    ) -> Shot:
+    def of(cls, given: MeshLike | Scene | Points, camera: CameraLike | None, size: object) -> Shot | CloudShot:
         """Return a shot of a subject; without a camera the three-quarter view."""
-        checked = as_size(size)
-        subject = as_subject(given) if takes_points else as_meshes(given)
+        checked, subject = as_size(size), as_subject(given)
         seen_by = camera_for(subject, camera, checked)
         if isinstance(subject, Points):
-            return cls(NOTHING, subject, seen_by, checked)
+            return CloudShot(subject, seen_by, checked)
         scene = scene_of(subject)
-        return cls(scene, None, seen_by, checked, is_mesh=scene is not subject)
+        return cls(scene, seen_by, checked, is_mesh=scene is not subject)
+
+    @classmethod
+    def of_meshes(cls, given: MeshLike | Scene, camera: CameraLike | None, size: object) -> Shot:
+        """Return a shot of a mesh or a scene, as `of` does; points are refused."""
+        checked, subject = as_size(size), as_meshes(given)
+        scene = scene_of(subject)
+        return cls(scene, camera_for(subject, camera, checked), checked, is_mesh=scene is not subject)
 
     def memory(self, rasterizer: Rasterizer | None) -> AbstractContextManager[Memory]:
         """Return the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.
@@ -62,10 +63,8 @@ class Shot:
         return rasterizer._lent
 
     @property
-    def subject(self) -> Mesh | Scene | Points:
-        """The points, the mesh or the scene, as verbs take it."""
-        if self.cloud is not None:
-            return self.cloud
+    def subject(self) -> Mesh | Scene:
+        """The mesh or the scene, as verbs take it."""
         return self.scene[0].mesh if self.is_mesh else self.scene
 
     def within(self, tolerance: float, *, in_parts: bool = False, **options: Any) -> Shot:

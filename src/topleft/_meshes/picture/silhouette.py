@@ -24,7 +24,7 @@ from topleft._core.raster.sampling import sample_positions, sum_areas
 from topleft._core.raster.view import View, WindowOptions
 from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.cloud import draw_share
+from topleft._meshes.picture.cloud import CloudShot
 from topleft._meshes.picture.draw_scene import SampleTarget, draw_scene
 from topleft._meshes.picture.placed import Placed
 from topleft._meshes.picture.shot import Shot
@@ -95,8 +95,8 @@ def silhouette(
     16.2
     """
     shot = Shot.of(mesh, camera, size)
-    if shot.cloud is not None:
-        share = draw_share(shot.cloud, shot.camera, shot.size, sampling=sampling, cull=cull, threads=threads, **view)
+    if isinstance(shot, CloudShot):
+        share = shot.share(sampling=sampling, cull=cull, threads=threads, **view)
         if out is None:
             return share
         result = as_out("out", out, share.shape, share.dtype.type)

@@ -25,7 +25,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.picture.fragments import SceneDepthLayers
 from topleft._meshes.picture.holes import Cut, cuts_of, draw_holed, holed_instances, solid_scene
 from topleft._meshes.picture.placed import Placed
-from topleft._meshes.picture.scene_shade import shade
+from topleft._meshes.picture.render import shade
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
@@ -99,7 +99,7 @@ def render_transparent(
     192
     """
     layers, material = as_count("layers", layers), look.get("material")
-    shot = Shot.of(mesh, camera, size, takes_points=False).within(tolerance, cull=cull, material=material)
+    shot = Shot.of_meshes(mesh, camera, size).within(tolerance, cull=cull, material=material)
     camera, size = shot.camera, shot.size
     ground = as_color("background", background, 4)
     view: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
@@ -191,6 +191,6 @@ def visible_layers(
     >>> int(layers.count[8, 8])  # the front and the back
     2
     """
-    shot = Shot.of(mesh, camera, size, takes_points=False)
+    shot = Shot.of_meshes(mesh, camera, size)
     check_straight(shot.camera)
     return peel_shot(shot, **options)

@@ -16,15 +16,15 @@ from topleft._core.base.array_types import F64, Array, MeshLike
 from topleft._core.base.arrays import as_real, shown
 from topleft._core.base.color import ColorLike
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._core.base.options import check_layers
+from topleft._core.base.options import LAYER_NAMES, check_layers
 from topleft._core.base.remote import Location
 from topleft._core.polygons.rle import to_rle
 from topleft._core.raster.verbs import Rasterizer
 from topleft._meshes.camera.camera import CameraLike, as_camera
 from topleft._meshes.io.layer_files import save_layers
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.gbuffer import GBuffer
-from topleft._meshes.picture.layers import LAYERS, draw_layers
+from topleft._meshes.picture.cloud import CloudShot
+from topleft._meshes.picture.layers import CloudLayers, Layers, MeshLayers
 from topleft._meshes.picture.shade import LookOptions
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Scene
@@ -234,19 +234,19 @@ def render_layers(
         raise TypeError(f"attributes must map names to values, got {shown(attributes)}")
     if attributes and tolerance:
         raise ValueError("attributes are those of the mesh's own vertices, which a tolerance may leave out")
-    gbuffer = gbuffer_of(
+    view = layers_of(
         mesh, camera, size, camera_to=camera_to, transforms_to=transforms_to, cull=cull,
         subpixel_bits=subpixel_bits, tolerance=tolerance, threads=threads, rasterizer=rasterizer, **look,
     )  # fmt: skip
-    found = draw_layers(names, gbuffer)
+    found = view.draw(names)
     for name, values in (attributes or {}).items():
-        if name in LAYERS:
+        if name in LAYER_NAMES:
             raise ValueError(f"attributes must not have the name of a layer, got {name!r}")
-        found[name] = gbuffer.frags.interpolate(values, background=np.nan)
-    return ViewLayers(found, len(gbuffer.shot.scene))
+        found[name] = view.frags.interpolate(values, background=np.nan)
+    return ViewLayers(found, view.n_instances)
 
 
-def gbuffer_of(
+def layers_of(
     mesh: MeshLike | Scene | Points,
     camera: CameraLike | None,
     size: int | tuple[int, int],
@@ -259,24 +259,23 @@ def gbuffer_of(
     threads: int | None = None,
     rasterizer: Rasterizer | None = None,
     **look: Any,
-) -> GBuffer:
-    """Return the G-buffer that layers are made from; arguments and errors as for `render_layers`."""
+) -> Layers:
+    """Return the layers of a view, which are drawn by name; arguments and errors as for `render_layers`."""
     for option in sorted(look.keys() - (GLASS_LOOKS if "opacity" in look else LOOKS)):
         raise TypeError(f"there is no option {option!r} of a picture")
-    shot = Shot.of(mesh, camera, size)
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    if shot.cloud is None:
-        shot = shot.within(tolerance, cull=cull, material=look.get("material"))
-    n = len(shot.scene)
-    flow = (
-        None if camera_to is None else as_camera(camera_to, "camera_to"),
-        None if transforms_to is None else as_transforms(transforms_to, n),
-    )
-    return GBuffer(shot, options, look, *flow, rasterizer)
+    shot = Shot.of(mesh, camera, size)
+    end = None if camera_to is None else as_camera(camera_to, "camera_to")
+    if isinstance(shot, CloudShot):
+        return CloudLayers(shot, options, look, end, as_transforms(transforms_to, 1), rasterizer)
+    shot = shot.within(tolerance, cull=cull, material=look.get("material"))
+    return MeshLayers(shot, options, look, end, as_transforms(transforms_to, len(shot.scene)), rasterizer)
 
 
-def as_transforms(transforms: npt.ArrayLike, n: int) -> F64:
-    """Return a matrix for each instance, (N, 4, 4) float64."""
+def as_transforms(transforms: npt.ArrayLike | None, n: int) -> F64 | None:
+    """Return a matrix for each instance, (N, 4, 4) float64; None of none."""
+    if transforms is None:
+        return None
     array = as_real("transforms_to", transforms)
     if n == 1 and array.shape == (4, 4):
         array = array[None]
