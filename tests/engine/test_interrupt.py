@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,32 +36,55 @@ def crossing_star(n):
     return 1000 + radius[:, None] * np.stack([np.cos(angles), np.sin(angles)], 1)
 
 
-LARGE, SMALL = random_triangles(100_000, 2000), random_triangles(1_000_000, 30)
-FLAT = LARGE[0][:, :2], LARGE[1]
+@cache
+def large():
+    return random_triangles(100_000, 2000)
+
+
+@cache
+def small():
+    return random_triangles(1_000_000, 30)
+
+
+def flat():
+    return large()[0][:, :2], large()[1]
+
+
+def many_polygons():
+    return flat()[0], np.arange(0, 300_001, 3), np.arange(100_001)
+
+
+@cache
+def ball_fragments():
+    return tl.rasterize_mesh(BALL, VIEWER, (3000, 3000))
+
+
+@cache
+def buffer():
+    return tl.rasterize(large()[0], large()[1][:100], SIZE)
+
+
 THIN = np.array([[-1e12, -1e12 - 9e3, 0.0], [1e12, 1e12 - 9e3, 0.5], [0.0, 9e3, 1.0]])
 COLORS = np.random.default_rng(2).integers(0, 256, (100_000, 4), dtype=np.uint8)
-POLYGONS = FLAT[0], np.arange(0, 300_001, 3), np.arange(100_001)
 BALL = tl.Mesh(*tl.scenes.shape("icosphere"))
 VIEWER = tl.Camera.look_at((0, 0, 1.2), (0, 0, 0))
-BALL_FRAGS = tl.rasterize_mesh(BALL, VIEWER, (3000, 3000))
 SHEET = tl.Mesh(np.eye(3), [[0, 1, 2]], uv=[[0, 0], [1, 0], [0, 1]])
-BUFFER = tl.rasterize(LARGE[0], LARGE[1][:100], SIZE)
 LIGHTS = [tl.Light((x, 1, 3), kind="point", space="eye") for x in range(400)]
 
 DRAWS = {
-    "coverage by edges": lambda n: tl.coverage(*FLAT, SIZE, method="edge", threads=n),
-    "coverage by area": lambda n: tl.coverage(*FLAT, SIZE, sampling="area", threads=n),
-    "coverage of msaa16": lambda n: tl.coverage(*FLAT, SIZE, sampling="msaa16", threads=n),
-    "overdraw of squares": lambda n: tl.overdraw(*FLAT, SIZE, sampling="outer", threads=n),
-    "overdraw far away": lambda n: tl.overdraw(FLAT[0] * 1e6 - 1e9, FLAT[1], SIZE, threads=n),
-    "rasterize": lambda n: tl.rasterize(*LARGE, SIZE, threads=n),
-    "rasterize msaa16": lambda n: tl.rasterize(*SMALL, SIZE, sampling="msaa16", threads=n),
-    "fill over": lambda n: tl.fill(*FLAT, COLORS, SIZE, per="triangle", blend="over", threads=n),
+    "coverage by edges": lambda n: tl.coverage(*flat(), SIZE, method="edge", threads=n),
+    "coverage by area": lambda n: tl.coverage(*flat(), SIZE, sampling="area", threads=n),
+    "coverage of msaa16": lambda n: tl.coverage(*flat(), SIZE, sampling="msaa16", threads=n),
+    "overdraw of squares": lambda n: tl.overdraw(*flat(), SIZE, sampling="outer", threads=n),
+    "overdraw far away": lambda n: tl.overdraw(flat()[0] * 1e6 - 1e9, flat()[1], SIZE, threads=n),
+    "rasterize": lambda n: tl.rasterize(*large(), SIZE, threads=n),
+    "rasterize msaa16": lambda n: tl.rasterize(*small(), SIZE, sampling="msaa16", threads=n),
+    "fill over": lambda n: tl.fill(*flat(), COLORS, SIZE, per="triangle", blend="over", threads=n),
     "fill over by area": lambda n: tl.fill(
-        *FLAT, COLORS, SIZE, per="triangle", blend="over", sampling="area", threads=n
+        *flat(), COLORS, SIZE, per="triangle", blend="over", sampling="area", threads=n
     ),
-    "peel": lambda n: tl.peel(*LARGE, SIZE, threads=n),
-    "smooth wireframe": lambda n: tl.wireframe(*FLAT, SIZE, antialias=True, threads=n),
+    "peel": lambda n: tl.peel(*large(), SIZE, threads=n),
+    "smooth wireframe": lambda n: tl.wireframe(*flat(), SIZE, antialias=True, threads=n),
     "mask of a polygon": lambda n: tl.polygons(chords(8_000_000), SIZE, threads=n),
     "mask of a nonzero polygon": lambda n: tl.polygons(chords(4_000_000), SIZE, rule="nonzero", threads=n),
     "labels of polygons": lambda n: tl.polygons(
@@ -69,26 +93,35 @@ DRAWS = {
     "area of a polygon": lambda n: tl.polygons(crossing_star(400_000), SIZE, sampling="area", threads=n),
     "table of a polygon": lambda n: tl.overlap([[crossing_star(400_000)]] * 2, SIZE, threads=n),
     "crossings in a pixel": lambda n: tl.polygons(chords(12_000) / 2000, 1, sampling="area", threads=n),
-    "polygons": lambda n: tl.polygons(POLYGONS, SIZE, values="index", threads=n),
-    "polygons by area": lambda n: tl.polygons(POLYGONS, SIZE, sampling="area", threads=n),
-    "points": lambda n: tl.points(SMALL[0], SIZE, point_size=400.0, shape="disc", threads=n),
-    "shade": lambda n: tl.shade(BALL_FRAGS, BALL, VIEWER, lights=LIGHTS, threads=n),
-    "coverage exact": lambda n: tl.coverage(*FLAT, SIZE, subpixel_bits="exact", threads=n),
+    "polygons": lambda n: tl.polygons(many_polygons(), SIZE, values="index", threads=n),
+    "polygons by area": lambda n: tl.polygons(many_polygons(), SIZE, sampling="area", threads=n),
+    "points": lambda n: tl.points(small()[0], SIZE, point_size=400.0, shape="disc", threads=n),
+    "shade": lambda n: tl.shade(ball_fragments(), BALL, VIEWER, lights=LIGHTS, threads=n),
+    "coverage exact": lambda n: tl.coverage(*flat(), SIZE, subpixel_bits="exact", threads=n),
     "overdraw exact far away": lambda n: tl.overdraw(
-        FLAT[0] * 1e6 - 1e9, FLAT[1], SIZE, subpixel_bits="exact", threads=n
+        flat()[0] * 1e6 - 1e9, flat()[1], SIZE, subpixel_bits="exact", threads=n
     ),
     "rasterize one exact triangle without a plane": lambda n: tl.rasterize(
         THIN, [[0, 1, 2]], (6000, 5000), subpixel_bits="exact", threads=n
     ),
-    "rasterize exact msaa16": lambda n: tl.rasterize(*SMALL, SIZE, sampling="msaa16", subpixel_bits="exact", threads=n),
-    "table of triangles": lambda n: tl.overlap(FLAT[0], SIZE, triangles=FLAT[1], threads=n),
-    "tiles": lambda n: list(tl.tiles(FLAT, SIZE, kind="overdraw", sampling="area", window=500, threads=n)),
-    "merge": lambda n: tl.merge([BUFFER] * 3000, threads=n),
+    "rasterize exact msaa16": lambda n: tl.rasterize(
+        *small(), SIZE, sampling="msaa16", subpixel_bits="exact", threads=n
+    ),
+    "table of triangles": lambda n: tl.overlap(flat()[0], SIZE, triangles=flat()[1], threads=n),
+    "tiles": lambda n: list(tl.tiles(flat(), SIZE, kind="overdraw", sampling="area", window=500, threads=n)),
+    "merge": lambda n: tl.merge([buffer()] * 3000, threads=n),
     "viewshed": lambda n: tl.viewshed(np.zeros((2000, 2000)), (1000.5, 1000.5), eye_height=2.0, threads=n),
-    "gradients of areas": lambda n: tl.area_vjp(*FLAT, SIZE, np.ones(SIZE), threads=n),
+    "gradients of areas": lambda n: tl.area_vjp(*flat(), SIZE, np.ones(SIZE), threads=n),
     "bake from a source": lambda n: tl.bake(SHEET, "position", 2000, source=BALL, threads=n),
-    "height_map": lambda n: tl.height_map(LARGE, tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
+    "height_map": lambda n: tl.height_map(large(), tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
+
+
+@pytest.fixture(scope="module", autouse=True)
+def scenes_are_made():
+    """Before the clock of an interrupt runs, and not while tests are collected."""
+    for make in (large, small, ball_fragments, buffer):
+        make()
 
 
 def seconds_after_interrupt(draw):
@@ -119,7 +152,7 @@ def test_a_long_draw_interrupted_ends_soon(name, threads):
 
 @pytest.mark.parametrize("name", ["coverage by area", "fill over by area", "coverage of msaa16", "fill over"])
 def test_a_draw_after_one_that_was_interrupted_is_right(name):
-    few = FLAT[0], FLAT[1][:20]
+    few = flat()[0], flat()[1][:20]
     draws = {
         "coverage by area": lambda where: where.coverage(*few, sampling="area"),
         "coverage of msaa16": lambda where: where.coverage(*few, sampling="msaa16"),
@@ -128,10 +161,10 @@ def test_a_draw_after_one_that_was_interrupted_is_right(name):
     }
     kept = tl.Rasterizer(SIZE, threads=2)
     kept_draws = {
-        "coverage by area": lambda: kept.coverage(*FLAT, sampling="area"),
-        "coverage of msaa16": lambda: kept.coverage(*FLAT, sampling="msaa16"),
-        "fill over": lambda: kept.fill(*FLAT, COLORS, per="triangle", blend="over"),
-        "fill over by area": lambda: kept.fill(*FLAT, COLORS, per="triangle", blend="over", sampling="area"),
+        "coverage by area": lambda: kept.coverage(*flat(), sampling="area"),
+        "coverage of msaa16": lambda: kept.coverage(*flat(), sampling="msaa16"),
+        "fill over": lambda: kept.fill(*flat(), COLORS, per="triangle", blend="over"),
+        "fill over by area": lambda: kept.fill(*flat(), COLORS, per="triangle", blend="over", sampling="area"),
     }
     seconds_after_interrupt(kept_draws[name])
     assert_same(draws[name](kept), draws[name](tl.Rasterizer(SIZE, threads=1)))
@@ -139,22 +172,22 @@ def test_a_draw_after_one_that_was_interrupted_is_right(name):
 
 def test_out_after_an_interrupt_changes_no_more():
     out = np.zeros(SIZE[::-1], np.int32)
-    seconds_after_interrupt(lambda: tl.overdraw(*FLAT, SIZE, threads=2, out=out))
+    seconds_after_interrupt(lambda: tl.overdraw(*flat(), SIZE, threads=2, out=out))
     before = out.copy()
     time.sleep(0.3)
     assert_same(out, before)
 
 
 def test_a_signal_whose_handler_draws_leaves_the_picture_as_it_is():
-    few = np.ascontiguousarray(FLAT[0][:6_000]), FLAT[1][:2_000]
+    few = np.ascontiguousarray(flat()[0][:1_500]), flat()[1][:500]
     expected, n_drawn = tl.overdraw(*few, SIZE, threads=1), []
-    small = random_triangles(3000, 30)
+    others = random_triangles(300, 30)
 
     def draw(*_):
-        n_drawn.append(int(tl.coverage(*small, (100, 100), threads=1).sum()))
+        n_drawn.append(int(tl.coverage(*others, (100, 100), threads=1).sum()))
 
     before = signal.signal(signal.SIGALRM, draw)
-    signal.setitimer(signal.ITIMER_REAL, 0.05)  # while the kernel draws
+    signal.setitimer(signal.ITIMER_REAL, 0.02)  # while the kernel draws
     try:
         got = tl.overdraw(*few, SIZE, threads=1)
     finally:
@@ -172,7 +205,7 @@ def test_an_error_of_a_signal_handler_is_raised_by_the_draw():
     signal.setitimer(signal.ITIMER_REAL, 0.2)
     try:
         with pytest.raises(TimeoutError, match="too long"):
-            tl.overdraw(*FLAT, SIZE, threads=1)
+            tl.overdraw(*flat(), SIZE, threads=1)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
