@@ -17,7 +17,7 @@ from topleft._core.raster import choices
 collect_ignore = [] if Path(__file__).parents[1].joinpath("benchmarks").is_dir() else ["studies"]
 
 settings.register_profile(
-    "fixed", derandomize=True, deadline=None, database=None, max_examples=300, suppress_health_check=list(HealthCheck)
+    "fixed", derandomize=True, deadline=None, database=None, max_examples=120, suppress_health_check=list(HealthCheck)
 )
 settings.load_profile("fixed")
 

@@ -506,9 +506,9 @@ def topleft_with(method):
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
-@pytest.mark.parametrize("meshes", [["octahedron"], ["octahedron", "tetrahedron"]])
 @pytest.mark.parametrize(("jobs", "method"), [(1, None), *((2, method) for method in get_all_start_methods())])
-def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, meshes, jobs, method):
+def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, jobs, method):
+    meshes = ["octahedron", "tetrahedron"]
     options = ["--jobs", str(jobs), "-o", "p/", "--shading", "ids", *SMALL]
     command = [sys.executable, *topleft_with(method), "render", *meshes, *options, "--views", "5000"]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:

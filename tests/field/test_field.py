@@ -26,13 +26,6 @@ def by_fractions(points, triangle, values, x, y):
     return v0 + b1 * (v1 - v0) + b2 * (v2 - v0)
 
 
-def test_field_of_a_linear_function_is_that_function():
-    values = [2 * x + 10 * y for x, y in SQUARE]
-    found = tl.field((SQUARE, HALVES), values, (4, 3), y="down")
-    assert found.tolist() == [[2 * x + 10 * y for x in (0.5, 1.5, 2.5, 3.5)] for y in (0.5, 1.5, 2.5)]
-    assert found.dtype == np.float64
-
-
 def test_field_y_up_is_the_picture_turned_over():
     values = [0.0, 1, 5, 3]
     up, down = (tl.field((SQUARE, HALVES), values, (8, 6), y=y) for y in ("up", "down"))

@@ -84,14 +84,6 @@ def test_a_window_shows_its_part_of_the_picture():
     assert_same(part.depth, whole.depth[3:10, 5:14])
 
 
-def test_squares_side_by_side_cover_each_pixel_once():
-    places = [(x + 0.3, y + 0.7) for y in range(4) for x in range(6)]
-    covered = sum(tl.points([place], (8, 6), point_size=1).mask.astype(int) for place in places)
-
-    assert covered.max() == 1
-    assert covered.sum() == len(places)
-
-
 def test_a_point_too_small_for_any_sample_shows_in_its_pixel():
     for place in ((4.0, 3.0), (3.01, 2.99), (3.99, 2.5)):
         for shape in ("disc", "square"):
