@@ -64,7 +64,7 @@ def environment():
 
 
 def test_small_calls_of_eight_threads_are_those_of_one():
-    assert differing(3_000, 8) == 0
+    assert differing(1_000, 8) == 0
 
 
 def test_a_mesh_first_drawn_by_several_threads_at_once_gives_one_picture():
@@ -130,7 +130,7 @@ def test_a_child_of_a_process_that_has_drawn_draws(how):
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True\n", "")
 
 
-@pytest.mark.parametrize("end", ["", "sys.exit(0)", "raise SystemExit(0)"])
+@pytest.mark.parametrize("end", ["", "sys.exit(0)"])
 def test_python_that_ends_while_threads_draw_ends(end):
     ended = subprocess.run([sys.executable, "-c", EXIT + end], capture_output=True, text=True, timeout=120)
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -6,7 +6,7 @@
 import json
 import os
 
-N_MUTATIONS = int(os.environ.get("TOPLEFT_MUTATIONS", "150"))
+N_MUTATIONS = int(os.environ.get("TOPLEFT_MUTATIONS", "80"))
 
 WORDS = [b"0", b"-1", b"1e999", b"nan", b"inf", b"4294967295", b"99999999999999999999", b"1.5", b"", b"/", b"//", b"\0"]
 JSON_VALUES = [
