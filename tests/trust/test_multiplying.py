@@ -17,7 +17,7 @@ PAIRS = """
     glb:channels:targets glb:channels:stored_keys glb:animations:channels glb:nodes:cameras glb:lines:nodes
     glb:overlapping:influences glb:nodes:skins
     obj:spellings:libraries obj:names:pixels obj:uses:materials collada:doubled:lists collada:shared:polygons
-    3mf:doubled:triangles 3mf:elsewhere:triangles zip:bytes:shift tar:bytes:members gz:bytes:lines bz2:bytes:lines
+    3mf:doubled:triangles 3mf:elsewhere:triangles zip:bytes:shift tar:bytes:members gz:bytes:lines
     packed_ply:strip:pixels levels:other:levels
 """
 """Of the many that the script tries by itself, with files of 5 MB."""
