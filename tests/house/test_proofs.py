@@ -1,4 +1,4 @@
-"""`.ci/prove.py` sees a planted error of each kind, and docs/design/proofs.md lists its claims."""
+"""`prove.py` sees a planted error of each kind, and docs/design/proofs.md lists its claims."""
 
 import re
 import shutil
