@@ -113,6 +113,8 @@ DRAWS = {
     "viewshed": lambda n: tl.viewshed(np.zeros((2000, 2000)), (1000.5, 1000.5), eye_height=2.0, threads=n),
     "gradients of areas": lambda n: tl.area_vjp(*flat(), SIZE, np.ones(SIZE), threads=n),
     "bake from a source": lambda n: tl.bake(SHEET, "position", 2000, source=BALL, threads=n),
+    "voxelize": lambda n: tl.voxelize(BALL, 600, samples=4, threads=n),
+    "voxelize a surface": lambda n: tl.voxelize(BALL, 900, solid=False, rule="touched", threads=n),
     "height_map": lambda n: tl.height_map(large(), tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 

@@ -8,9 +8,12 @@ Based on: Schwarz, M. and H.-P. Seidel, "Fast Parallel Surface and Solid Voxeliz
 
 from __future__ import annotations
 
+import math
 import operator
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -21,7 +24,7 @@ from topleft._core.base.array_types import F64, I32, U8, MeshLike
 from topleft._core.base.arrays import as_count, as_number, as_real, shown
 from topleft._core.base.memory import FRESH, SCRATCH, check_fits
 from topleft._core.base.options import parse
-from topleft._core.base.threads import run_parts, threads_for
+from topleft._core.base.threads import Part, run_parts, threads_for
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.normals import moved
@@ -32,6 +35,10 @@ from topleft.typing import CullOption, VoxelRuleOption
 SAMPLES = (1, 2, 4, 8)
 MOST_ALONG = 1 << 14
 """Voxels, or samples of them, along an axis."""
+
+BYTES_OF_PART = COLUMNS_OF_PART = 1 << 22
+"""A part takes 15 ms at most: bytes of arrays, of which shares of samples take longest; columns of voxels of triangles
+whose boxes fill the grid."""
 
 WORDS_AT_ONCE = 1 << 15
 """Words of columns that are compared together: they stay in a cache."""
@@ -183,23 +190,24 @@ def voxelize(
         shares: npt.NDArray[np.float32] = FRESH.empty("voxels", grid.shape, np.float32)
         bits, *told = solid_bits(grid, bodies, samples, n_threads)
         sample_bits = samples.bit_length() - 1
-        run_parts(
-            lambda first, end: engine.count_columns(bits, sample_bits, shares, first, end), len(shares), n_threads
-        )
+        n_parts = n_parts_of(bits, n_threads)
+        run_parts(lambda a, b: engine.count_columns(bits, sample_bits, shares, a, b), len(shares), n_parts, n_threads)
         return with_warning(grid, shares, *told)
     check_fits(grid.shape, np.bool_)
     voxels: npt.NDArray[np.bool_] = FRESH.empty("voxels", grid.shape, np.bool_)
     filled, told = voxels.view(np.uint8), [0, 0]
     if solid:
         bits, *told = solid_bits(grid, bodies, 1, n_threads)
-        run_parts(lambda first, end: engine.expand_columns(bits, filled, first, end), len(filled), n_threads)
+        in_parts(lambda first, end: engine.expand_columns(bits, filled, first, end), bits, n_threads)
     else:
-        filled[...] = 0
+        in_parts(lambda first, end: filled[first:end].fill(0), filled, n_threads)
     for vertices, triangles in bodies:
         points = grid.to_voxels(vertices)
         if rule == "touched" and len(triangles):
             check_finite(points)
-            engine.touch_voxels(points, triangles, 0, len(triangles), filled)
+            most_columns = math.prod(sorted(grid.shape)[1:])
+            n_parts = -(-len(triangles) // max(1, COLUMNS_OF_PART // most_columns))
+            run_parts(partial(touch_part, points, triangles, filled), len(triangles), n_parts, 1)
         elif not solid:
             mark_surface(points, triangles, filled, n_threads)
     return with_warning(grid, voxels, *told)
@@ -284,9 +292,27 @@ def solid_bits(
         fronts, _ = crossings("columns of fronts", points, triangles, shape, n_threads, fills=False, cull="back")
         n_odd += n
         n_nested += 0 if n else count_nested(bits, fronts)
-        union = bits if union is None else np.bitwise_or(union, bits, out=union)
+        if union is None:
+            union = bits
+        else:
+            in_parts(partial(add_bits, union, bits), bits, n_threads)
     assert union is not None  # a scene has an instance
     return union, n_odd, n_nested
+
+
+def add_bits(union: U64, bits: U64, first: int, end: int) -> None:
+    """Add the bits of rows to others."""
+    np.bitwise_or(union[first:end], bits[first:end], out=union[first:end])
+
+
+def n_parts_of(rows: npt.NDArray[Any], n_threads: int) -> int:
+    """How many parts of an array take milliseconds each: Python hears Ctrl-C between two of them."""
+    return max(n_threads, rows.nbytes // BYTES_OF_PART)
+
+
+def in_parts(work: Callable[[int, int], Part], rows: npt.NDArray[Any], n_threads: int) -> list[Part]:
+    """Return `work(first, end)` of parts of the rows of an array."""
+    return run_parts(work, len(rows), n_parts_of(rows, n_threads), n_threads)
 
 
 def count_nested(bits: U64, fronts: U64) -> int:
@@ -325,13 +351,13 @@ def crossings(
     seen[:, 0], seen[:, 1], seen[:, 2] = points[:, 1], points[:, 0], points[:, 2]
     snapped = snap_mesh(SCRATCH, seen, triangles, view, with_depth=True, out=None)
 
-    def draw_rows(first: int, end: int) -> int:
-        bits[first:end] = 0
+    def draw_rows(first: int, end: int) -> None:
         if engine.draw_crossings(snapped.mesh, bits, n_steps, is_set, first, end) >= 0:
             snapped.refuse()
-        return engine.fill_columns(bits, first, end) if fills else 0
 
-    return bits, sum(run_parts(draw_rows, n_rows, n_threads))
+    in_parts(lambda first, end: bits[first:end].fill(0), bits, n_threads)
+    run_parts(draw_rows, n_rows, n_threads)
+    return bits, sum(in_parts(partial(engine.fill_columns, bits), bits, n_threads)) if fills else 0
 
 
 def mark_surface(points: F64, triangles: I32, filled: U8, n_threads: int) -> None:
@@ -342,7 +368,17 @@ def mark_surface(points: F64, triangles: I32, filled: U8, n_threads: int) -> Non
         shape = tuple(filled.shape[k] for k in order)
         bits, _ = crossings("columns", np.ascontiguousarray(points[:, order]), triangles, shape, n_threads, fills=False)
         row, column, step = (filled.strides[k] for k in order)
-        engine.scatter_columns(bits, flat, (row, column, step))
+        in_parts(partial(scatter_rows, bits, flat, (row, column, step)), bits, 1)
+
+
+def touch_part(points: F64, triangles: I32, filled: U8, first: int, end: int) -> None:
+    """Mark the voxels that triangles [first, end) meet."""
+    engine.touch_voxels(points, triangles, first, end, filled)
+
+
+def scatter_rows(bits: U64, flat: U8, strides: tuple[int, int, int], first: int, end: int) -> None:
+    """Mark the voxels of rows [first, end) of bits."""
+    engine.scatter_columns(bits[first:end], flat[first * strides[0] :], strides)
 
 
 def check_finite(points: F64) -> None:
