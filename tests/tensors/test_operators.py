@@ -19,6 +19,7 @@ from topleft._core.base.arrays import as_checked_triangles  # noqa: E402
 from topleft._core.gradients import tensors  # noqa: E402
 from topleft._core.gradients.pictures import AttributePictures  # noqa: E402
 from topleft._core.gradients.tensors import PixelGrid, as_rule  # noqa: E402
+from topleft._core.raster.operations import Call, pictures_of  # noqa: E402
 from topleft._torch import operators  # noqa: E402
 
 CTX = dr.RasterizeContext()
@@ -557,18 +558,38 @@ def test_render_takes_what_was_kept_from_wherever_it_was_saved(monkeypatch):
     assert all(torch.equal(a, b) for a, b in zip(found, expected[1:], strict=True))
 
 
-@pytest.mark.parametrize("change", [torch.zeros_like, lambda one: one + 1, lambda one: one[: len(one) // 2],
-                                    lambda one: torch.cat([one[:9], one[9:] ^ 3]), lambda one: one[:0]])  # fmt: skip
-def test_render_draws_again_where_what_it_kept_was_changed(change):
+@pytest.mark.parametrize("has_wrong_ids", [False, True])
+@pytest.mark.parametrize("change", [torch.zeros_like, lambda one: one + 1, lambda one: one ^ 3 << 29])
+def test_render_draws_again_where_what_it_kept_was_changed(change, has_wrong_ids):
     pos, tri, colours = sphere(2)
 
     def pack(tensor):
-        return change(tensor) if tensor.dtype == torch.int64 else tensor
+        is_ids = tensor.dtype == torch.int32 and tensor.ndim == 3
+        return change(tensor) if tensor.dtype == torch.int64 or (is_ids and has_wrong_ids) else tensor
 
     expected = drawn_gradients(pos, tri, colours)
     with torch.autograd.graph.saved_tensors_hooks(pack, lambda tensor: tensor):
         found = drawn_gradients(pos, tri, colours)
-    assert all(torch.equal(a, b) for a, b in zip(found, expected, strict=True))
+    assert has_wrong_ids or all(torch.equal(a, b) for a, b in zip(found, expected, strict=True))
+
+
+def test_words_of_render_are_read_from_memory_that_no_other_thread_can_write():
+    pos, tri, colours = map(operators.numpy_of, sphere())
+    pictures = pictures_of(Call((), 1), (1, 70, 93), 0, pos, tri, colours[None], None)
+    words = pictures.pack(pictures.picture()[1])
+    seen = pictures.unpack(words)
+    words[:] = -1
+    assert all((one.faces >= 0).all() for one in seen)
+
+
+@pytest.mark.parametrize("change", [torch.Tensor.half, lambda one: one[:, :2], lambda one: one[:0]])
+@pytest.mark.parametrize("draw", [picture, lambda *given: dr.render(CTX, *given, (20, 20))])
+def test_tensors_that_hooks_return_in_other_shapes_or_dtypes_are_refused(draw, change):
+    pos, tri, colours = sphere()
+    with torch.autograd.graph.saved_tensors_hooks(lambda one: change(one) if one.ndim > 2 else one, torch.clone):
+        out = draw(pos.requires_grad_(), tri, colours)
+    with pytest.raises(RuntimeError, match="must come back from hooks of saved tensors as they were saved"):
+        out.sum().backward()
 
 
 def test_render_of_many_pictures_at_once_mixes_none_of_them():

@@ -85,6 +85,11 @@ def flat(given: Sequence[Any]) -> list[Any]:
     return [one for part in given for one in (part if isinstance(part, list | tuple) else [part])]
 
 
+def kind_of(tensor: Tensor | None) -> tuple[torch.Size, torch.dtype] | None:
+    """Return the shape and the dtype of a tensor."""
+    return None if tensor is None else (tensor.shape, tensor.dtype)
+
+
 def operator_of(operation: Operation) -> Any:
     """Make an operator of an operation, called with what it is given and with options, and register its gradients."""
     names, kept = ([one.rstrip("?*") for one in part.split()] for part in (operation.given, operation.kept))
@@ -131,10 +136,14 @@ def operator_of(operation: Operation) -> Any:
         ctx.options, given = inputs[-1], [known[name] for name in kept]
         ctx.n_listed = len(given[-1]) if isinstance(given[-1], list | tuple) else 0
         ctx.save_for_backward(*flat(given))
+        ctx.saved_as = list(map(kind_of, flat(given)))
 
     def backward(ctx: Any, *g: Tensor | None) -> tuple[Any, ...]:
         found: list[Any] = [None] * len(names)
         n, given = ctx.n_listed, list(ctx.saved_tensors)
+        if list(map(kind_of, given)) != ctx.saved_as:
+            raise RuntimeError("tensors must come back from hooks of saved tensors as they were saved, got "
+                               f"{[*map(kind_of, given)]}, not {ctx.saved_as}")  # fmt: skip
         if n:
             found[-1], given = [None] * n, [*given[:-n], given[-n:]]
         if operation.vjp is tensors.times:  # an operator would take longer

@@ -136,7 +136,8 @@ class AttributePictures:
         return words
 
     def unpack(self, words: NDArray[np.int64]) -> list[Seen] | None:
-        """Return what `pack` was given, by its memory; None where there is nothing, or the words were changed."""
+        """Return what `pack` was given; None where there is nothing, or the words were changed."""
+        words = words.copy()  # another thread may write to saved tensors
         if len(words) < 2 or words[0] != self.check_of(words[1:]):
             return None
         at = 8

@@ -206,6 +206,8 @@ def pictures_of(
     if ids is None:
         drawn = ids_of(call, grid, pos, [grid.tri] * len(pos), threads)
         ids = drawn[0][None] if len(drawn) == 1 else np.stack(drawn) if drawn else np.empty(grid.shape(), np.int32)
+    else:  # a copy: another thread may write to saved tensors
+        ids = np.clip(ids, -1, len(grid.tri) - 1)
     return AttributePictures(grid, EdgeRule(rule), known_across(grid, across), pos, ids, attr)
 
 
