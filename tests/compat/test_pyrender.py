@@ -113,6 +113,11 @@ def test_flat_pictures_show_the_base_color_as_it_is():
     assert (color == [51, 102, 255]).all()
 
 
+@pytest.mark.parametrize(("given", "unit"), [([0, 1, 1], 1), ([0, 1, 2], 255), ([0.0, 1.0, 2.0], 1)])
+def test_integers_of_a_color_are_bytes_where_one_is_above_1(given, unit):
+    assert_same(pr.DirectionalLight(color=given).color, np.array(given) / unit)
+
+
 @pytest.mark.parametrize("intensity", [0.5, 2.0])
 def test_matt_wall_in_a_directional_light_is_its_color_over_pi(intensity):
     """Albedo times intensity / pi, 4 % of which is mirrored at right angles; shown by the power 1 / 2.2."""

@@ -98,6 +98,21 @@ def test_sliver_between_middles_has_the_value_of_its_nearest_point():
     np.testing.assert_allclose(baked.values[1, :, 0], [0.5, 1.5, 2.5, 3.5], atol=0.02)
 
 
+def test_touched_texels_have_the_values_at_the_nearest_points():
+    corners = np.random.default_rng(8).uniform(1, 15, (3, 3, 2))
+    uv = np.stack([corners[..., 0], 16 - corners[..., 1]], -1).reshape(9, 2) / 16
+    mesh = tl.Mesh(np.pad(corners.reshape(9, 2), [(0, 0), (0, 1)]), np.arange(9).reshape(3, 3), uv=uv)
+    with pytest.warns(tl.MeshWarning, match="overlap"):
+        baked, inside = (tl.bake(mesh, "position", 16, rule=rule, gutter=0) for rule in ("touched", "center"))
+    for y, x in np.argwhere(baked.mask & ~inside.mask).tolist():
+        a, middle = corners[baked.triangle[y, x]], (x + 0.5, y + 0.5)
+        along = np.roll(a, -1, 0) - a
+        share = np.clip(((middle - a) * along).sum(1) / (along * along).sum(1), 0, 1)
+        points = a + share[:, None] * along
+        nearest = points[np.argmin(((points - middle) ** 2).sum(1))]
+        np.testing.assert_allclose(baked.values[y, x, :2], nearest, atol=1e-5)
+
+
 @ON_EACH_ISA
 @pytest.mark.parametrize("gutter", [1, 3, 8, 40])
 def test_gutter_has_what_the_nearest_texel_has(isa, gutter):

@@ -442,6 +442,23 @@ def test_gradients_of_rasterize_and_interpolate():
     assert torch.autograd.gradcheck(run, (pos.requires_grad_(), attr.requires_grad_()))
 
 
+def test_gradients_of_weights_that_are_clamped():
+    """Corners are snapped outwards by 0.0005 px or more, to centres of pixels, where the weights leave [0, 1]."""
+    low, high, w = -0.624875, 0.62475, np.array([1, 2, 0.5])
+    corners = np.array([[low, low], [high, low], [low, high]])
+    quarter = np.array([[0.0, 1], [-1, 0]])
+    turns = [np.roll(corners @ np.linalg.matrix_power(quarter, k % 4), k, axis=0) for k in range(12)]
+    pos = torch.tensor(np.stack([np.c_[w[:, None] * turn, 0.1 * w**2, w] for turn in turns]), requires_grad=True)
+
+    def run(pos):
+        return dr.rasterize(CTX, pos, torch.tensor([[0, 1, 2]]), (8, 8))
+
+    u, v, _, number = run(pos)[0].detach().unbind(-1)
+    for is_clamped in (u == 0, v == 0, u + v > 1 - 1e-9):
+        assert (is_clamped & (number > 0)).sum() > 12
+    assert torch.autograd.gradcheck(run, (pos,))
+
+
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_gradients_of_texture(boundary):
     tex, uv, uv_da = random(1, 4, 4, 2), 2 * random(1, 3, 3, 2, seed=1) - 0.5, random(1, 3, 3, 4, seed=2) / 2
