@@ -1,10 +1,12 @@
 """Ctrl-C, and other signals, while a kernel draws: heard soon, and nothing that is kept is left in disorder."""
 
 import os
+import re
 import signal
 import threading
 import time
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from comparing import assert_same
 
 import topleft as tl
 
+KERNELS = Path(__file__).parents[2] / "csrc/kernels.h"
 SIZE = (2000, 2000)
 LATEST_S = 0.5  # of the CPU, for each thread; it takes below 0.2, and by the clock longer on a machine that does others
 
@@ -124,6 +127,45 @@ def scenes_are_made():
     """Before the clock of an interrupt runs, and not while tests are collected."""
     for make in (large, small, ball_fragments, buffer):
         make()
+
+
+#: The draw that is interrupted in a kernel.
+HEARD = {
+    "draw_mesh": "coverage by edges", "draw_area": "coverage by area", "blend": "fill over",
+    "draw_lines": "smooth wireframe", "draw_cloud": "points", "shade": "shade", "mask_even_odd": "mask of a polygon",
+    "mask_nonzero": "mask of a nonzero polygon", "label_polygons": "labels of polygons",
+    "share_polygons": "polygons by area", "merge_fragments": "merge", "view_heights": "viewshed",
+    "grad_area": "gradients of areas", "nearest_of_points": "bake from a source", "count_columns": "voxelize",
+    "fill_columns": "voxelize", "touch_voxels": "voxelize a surface",
+}  # fmt: skip
+
+#: Kernels that ask, or end between two calls, with what bounds a call; no draw above takes its time in them.
+IN_PARTS = {
+    "asks between rows or triangles": "fill_large_shapes shade_samples certify_polygons cut_faces",
+    "4 MB of bits": "expand_columns scatter_columns",
+    "a band of 65,536 pixels": "grad_points grad_points_vjp grad_values grad_values_vjp grad_texels grad_texels_vjp "
+    "grad_edges grad_picture",
+    "a window of a raster, or the triangles of a block": "list_spans sort_spans count_windows take_corners",
+    "some points of a surface": "find_reach",
+    "an encoded block of rows": "encode_rows",
+}
+
+#: One pass over vertices, triangles, texels or pixels of a finished picture: it ends first (docs/guide/trust.md).
+PASSES = """snap project clip mark_vertices place_on_curve sort_keys cut_clusters measure_clusters survey_clusters
+find_shown first_bad first_bad_row narrow_triangles take_points count_classes bin list_bins find_columns set_inverse_w
+drop_sides list_edges name_triangles set_flat_depth lay_rows split_pixels spread_ids find_instances list_column_runs
+count_runs write_counts inverse_ws barycentric interpolate fill_slopes fill_texels levels_seen halve_rows paint_flat
+paint_gouraud mean_flat mean_colors composite fill_points list_planes fill_planes shade_normals cut_out vertex_normals
+face_normals find_turned face_angles list_corners find_creases sum_creases box_of_faces unit_vectors move_points
+color_rows bend_vertices see_points find_bent split_bent group_rows build_tree set_feet snap_points bound_polygons
+sort_polygons trust_polygons touch_texels average_texels find_in_rows find_gutter copy_texels add_taken grad_sides
+mark_silhouettes"""
+
+
+def test_each_kernel_is_interrupted_or_ends_first():
+    kernels = re.findall(r"^TL_KERNEL\(\w+, (\w+),", KERNELS.read_text(), re.MULTILINE)
+    assert sorted([*HEARD, *" ".join(IN_PARTS.values()).split(), *PASSES.split()]) == sorted(kernels)
+    assert set(HEARD.values()) <= set(DRAWS)
 
 
 def seconds_after_interrupt(draw):
