@@ -1,5 +1,6 @@
 """The pages: links lead somewhere, every page and picture is shown by another, and api.md has the public names."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from topleft._meshes.io.limits.budget import LIMITS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
+READERS = ROOT / "src/topleft/_meshes/io"
 PAGES = sorted(DOCS.rglob("*.md"))
 FRONT = sorted(ROOT.glob("*.md"))
 CHECKED = [*FRONT, *PAGES, *sorted(ROOT.glob("benchmarks/**/*.md")), *sorted(ROOT.glob("csrc/**/*.md"))]
@@ -99,6 +101,22 @@ def test_limits_of_files_are_those_of_the_page():
         name: (8 << 30 if "G" in least else int(least.replace(",", "")), float(more or 0)) for name, least, more in rows
     }
     assert said == {name: (limit.least, limit.per_byte) for name, limit in LIMITS.items()}
+
+
+def test_warnings_of_readers_are_those_of_the_page():
+    page = (DOCS / "guide/files.md").read_text(encoding="utf-8").partition("\nFaces with more")[0]
+    rows = re.findall(r"(?m)^\| .+ \| .* \| (.*) \| .*\|$", page)
+    told = {kind for row in rows[1:] for kind in row.split("; ") if kind.strip("- ")}
+    trees = [
+        ast.parse(path.read_text(encoding="utf-8")) for path in READERS.rglob("*.py") if "polygon" not in path.name
+    ]
+    calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    added = [call.args[0] for call in calls if re.search(r"notes\.add$", ast.unparse(call.func))]
+    kinds = {node.value for node in added if isinstance(node, ast.Constant)}
+    assert kinds - told == set()
+    texts = {node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    words = " ".join(text for text in texts if isinstance(text, str))
+    assert [kind for kind in told for part in kind.split("…") if part not in words] == []
 
 
 def test_each_room_has_a_promise_in_trust():

@@ -286,6 +286,41 @@ def test_collada_texture_and_its_alpha_are_laid(read, tmp_path, name, params, al
     assert mesh.uv[mesh.triangles[0]].tolist() == [[0, 0], [0, 1], [1, 1]]
 
 
+@pytest.mark.parametrize(
+    ("wraps", "expected"),
+    [
+        ("", ("repeat", "repeat")),
+        ("<wrap_s>CLAMP</wrap_s><wrap_t> MIRROR </wrap_t>", ("clamp", "mirror")),
+        ("<wrap_t>BORDER</wrap_t>", ("repeat", "clamp")),
+    ],
+)
+def test_collada_textures_go_on_as_their_samplers_say(read, tmp_path, wraps, expected):
+    tl.save_image(tmp_path / "a.png", np.zeros((1, 1, 3), np.uint8))
+    laid = "<phong><diffuse><texture texture='sa' texcoord='U'/></diffuse></phong>"
+    images = "<library_images><image id='i'><init_from>a.png</init_from></image></library_images>"
+    params = TEXTURE.replace("</sampler2D>", f"{wraps}</sampler2D>")
+    assert read(collada(node=BOUND, more=images + effect("m", laid, params)))[0].materials[0].texture.wrap == expected
+
+
+@pytest.mark.parametrize(("number", "n"), [(0, 0), (1, 1)])
+def test_collada_texture_of_further_coordinates_is_told(read, tmp_path, number, n):
+    tl.save_image(tmp_path / "a.png", np.zeros((1, 1, 3), np.uint8))
+    laid = "<phong><diffuse><texture texture='i' texcoord='U'/></diffuse></phong>"
+    images = "<library_images><image id='i'><init_from>a.png</init_from></image></library_images>"
+    uv = source("t", "0 0 1 0 1 1", 2) + source("w", "0 0 1 0 1 1", 2)
+    inputs = INPUTS + "".join(
+        f"<input semantic='TEXCOORD' source='#{a}' offset='1' set='{k}'/>" for k, a in enumerate("tw")
+    )
+    faces = f"{uv}<triangles material='a' count='1'>{inputs}<p>0 0 1 1 2 2</p></triangles>"
+    bound = f"<bind_vertex_input semantic='U' input_semantic='TEXCOORD' input_set='{number}'/></instance_material>"
+    node = BOUND.replace(
+        "<instance_material symbol='a' target='#m'/>", f"<instance_material symbol='a' target='#m'>{bound}"
+    )
+    assert node != BOUND
+    _, told = read(collada(faces, node=node, more=images + effect("m", laid)))
+    assert told == ["textures laid by the first of several texture coordinates: 'U'"] * n
+
+
 def test_collada_normals_and_colours_of_corners_are_read(read):
     own = source("n", "0 0 1 0 1 0", 3) + source("k", "1 0 0 0 .5 1", 3)
     inputs = (

@@ -228,6 +228,45 @@ def test_load_of_3mf_with_objects_in_further_files_is_refused_in_true_words(tmp_
         files.load(tmp_path / "a.3mf")
 
 
+@pytest.mark.parametrize(
+    ("attribute", "told"),
+    [
+        ("", []),
+        (" pid='5' p1='0'", ["colours and materials not read"]),
+        (" paint_color='8'", ["colours and materials not read"]),
+    ],
+)
+def test_load_of_3mf_tells_of_colours(tmp_path, recwarn, attribute, told):
+    for package in ("lxml", "networkx"):
+        pytest.importorskip(package, reason="3MF needs it, of the extra formats")
+    corners = "".join(f"<vertex x='{x}' y='{y}' z='0'/>" for x, y in ((0, 0), (1, 0), (0, 1)))
+    with zipfile.ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr(
+            "3D/3dmodel.model",
+            "<model xmlns='http://schemas.microsoft.com/3dmanufacturing/core/2015/02'><resources><object id='1'><mesh>"
+            f"<vertices>{corners}</vertices><triangles><triangle v1='0' v2='1' v3='2'{attribute}/></triangles></mesh>"
+            "</object></resources><build><item objectid='1'/></build></model>",
+        )
+    assert len(files.load(tmp_path / "a.3mf").triangles) == 1
+    assert [str(one.message).partition(": ")[2] for one in recwarn] == told
+
+
+def test_load_reads_files_of_its_root(tmp_path):
+    for folder in ("meshes", "textures"):
+        (tmp_path / folder).mkdir()
+    tl.save_image(tmp_path / "textures/a.png", np.zeros((1, 1, 3), np.uint8))
+    (tmp_path / "meshes/a.mtl").write_text("newmtl m\nmap_Kd ../textures/a.png\n")
+    path = tmp_path / "meshes/a.obj"
+    path.write_text("mtllib a.mtl\n" + SQUARE + "vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n")
+    for root in (None, tmp_path / "meshes"):
+        with pytest.warns(MeshWarning, match=r"textures outside of its folder not read: '../textures/a.png'"):
+            assert files.load(path, root=root).materials[0].texture is None
+    for root in (tmp_path, tmp_path / "textures"):  # which need not hold the mesh
+        assert files.load(path, root=root).materials[0].texture is not None
+    with pytest.raises(ValueError, match="root must be a folder, got"):
+        files.load(path, root=path)
+
+
 def test_load_by_meshio_prints_nothing(write, capfd):
     meshio = pytest.importorskip("meshio")
     path = write("a.msh", b"")

@@ -29,12 +29,14 @@ from topleft._meshes.model.polygons import triangulate
 from topleft._meshes.model.pose import rotation_of_vector
 from topleft._meshes.model.texture import Texture
 from topleft.errors import MeshError
-from topleft.typing import UpOption
+from topleft.typing import UpOption, WrapOption
 
 SHADERS = ("phong", "lambert", "blinn", "constant")
 FACES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 NUMBERS_OF = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3, "lookat": 9, "skew": 7}
 """How many numbers each transform of a node has."""
+
+WRAPS: dict[str, WrapOption] = {"MIRROR": "mirror", "CLAMP": "clamp", "BORDER": "clamp", "NONE": "clamp"}
 
 NODES_OF_LIST = 4
 """Nodes of glTF that take as long as a list of triangles."""
@@ -68,7 +70,8 @@ class _Collada:
         self._arrays: dict[str, F64] = {}
         self._lists: dict[Element, list[tuple[str | None, Mesh]]] = {}
         self._materials: dict[Element, Material] = {}
-        self._textures: dict[int, Texture | None] = {}
+        self._textures: dict[tuple[int, WrapOption, WrapOption], Texture | None] = {}
+        self._sets = {row.get("texcoord") for row in root.iter("texture")}
         axis = (root.findtext("asset/up_axis") or "Y_UP").strip()
         self._up: UpOption = "z" if axis == "Z_UP" else "y"
         if axis not in ("Y_UP", "Z_UP"):
@@ -119,6 +122,10 @@ class _Collada:
         if geometry is None:
             self._notes.add("geometries that are not there", instance.get("url", ""))
             return
+        first = geometry.find(".//input[@semantic='TEXCOORD']")
+        for row in instance.iter("bind_vertex_input") if first is not None else ():
+            if row.get("semantic") in self._sets and row.get("input_set", "0") != first.get("set", "0"):
+                self._notes.add("textures laid by the first of several texture coordinates", row.get("semantic", ""))
         targets = {row.get("symbol"): row.get("target") for row in instance.iter("instance_material")}
         budget = self._source.budget
         budget.spend("max_nodes", len(targets))
@@ -259,7 +266,8 @@ class _Collada:
         if effect.find(".//bump") is not None:
             self._notes.add("bump maps not drawn")
         is_flat = shader.tag == "constant"
-        color, picture = self._slot(shader, "emission" if is_flat else "diffuse", params)
+        base = "emission" if is_flat else "diffuse"
+        color, picture = self._slot(shader, base, params)
         light, glow = (None, None) if is_flat else self._slot(shader, "emission", params)
         (specular, _), (shininess, _) = (self._slot(shader, name, params) for name in ("specular", "shininess"))
         if specular is None or shininess is None or shininess[0] <= 0:
@@ -271,7 +279,7 @@ class _Collada:
         emission = np.zeros(3) if light is None else decode_srgb(np.maximum(_rgba(light)[:3], 0))
         return Material(
             None if color is None or picture is not None else _color(color),
-            self._texture(picture),
+            self._texture(picture, *_wraps(shader, base, params)),
             specular=float(np.mean(specular[:3]).clip(0, 1)),
             shininess=float(shininess[0]),
             unlit=is_flat,
@@ -279,7 +287,7 @@ class _Collada:
             alpha_mode="blend" if is_clear else "opaque",
             double_sided=next((row.text or "" for row in effect.iter("double_sided")), "").strip() != "0",
             emission=tuple((np.ones(3) if glow is not None else emission).tolist()),
-            emission_texture=self._texture(glow),
+            emission_texture=self._texture(glow, *_wraps(shader, "emission", params)),
         )
 
     def _opacity(self, shader: Element, params: dict[str | None, Element]) -> tuple[float, U8 | None]:
@@ -327,13 +335,22 @@ class _Collada:
         path = path.strip()
         return self._source.picture(path if path[:5].lower() == "file:" else unquote(path))
 
-    def _texture(self, picture: U8 | None) -> Texture | None:
+    def _texture(self, picture: U8 | None, wrap_u: WrapOption, wrap_v: WrapOption) -> Texture | None:
         if picture is None:
             return None
-        if id(picture) not in self._textures:
+        key = id(picture), wrap_u, wrap_v
+        if key not in self._textures:
             may = self._source.may_lay(picture, "")
-            self._textures[id(picture)] = Texture(picture) if may else None
-        return self._textures[id(picture)]
+            self._textures[key] = Texture(picture, wrap=(wrap_u, wrap_v)) if may else None
+        return self._textures[key]
+
+
+def _wraps(shader: Element, name: str, params: dict[str | None, Element]) -> tuple[WrapOption, WrapOption]:
+    """The continuation along u and v of the texture of a property of a shader, as its sampler says."""
+    row = shader.find(f"{name}/texture")
+    sampler = params.get(None if row is None else row.get("texture"))
+    along_u, along_v = ((None if sampler is None else sampler.findtext(f".//wrap_{axis}")) or "" for axis in "st")
+    return WRAPS.get(along_u.strip(), "repeat"), WRAPS.get(along_v.strip(), "repeat")
 
 
 def _numbers(row: Element | None) -> F64:

@@ -60,6 +60,9 @@ CONVERTERS = {
 """Formats without a reader, and programs that make glTF of them."""
 BINARY_DXF = b"AutoCAD Binary DXF"
 
+COLORS_3MF = {"pid", "p1", "paint_color", "mmu_segmentation"}
+"""Attributes of objects and triangles that give colours, of the standard and of slicers: trimesh does not read them."""
+
 NODES_OF_TRIMESH = 4
 """Nodes of glTF that take as long as a node that trimesh reads: 0.2 ms."""
 
@@ -73,7 +76,7 @@ def read_by_trimesh(source: InputFile) -> list[Mesh]:
         raise MissingPackageError(_needs(source, "trimesh")) from None
     _refuse_unreadable(source, suffix)
     try:
-        with quiet():
+        with quiet(source):
             source.content()  # which is counted
             parts = list(_parts(trimesh.load_scene(str(source.path), process=False), source))
     except NotImplementedError:
@@ -155,6 +158,8 @@ def _check_models(archive: zipfile.ZipFile, source: InputFile) -> None:
     if main is None:
         return
     counts = {row.filename: Model3MF(archive.read(row), source.budget) for row in models}
+    for kind in sorted(set().union(*(model.unread for model in counts.values()))):
+        source.notes.add(kind)
     first = counts[main.filename]
     if len(models) > 1 and not first.has_objects:
         raise MeshError(f"cannot read {str(source.path)!r}: its objects are in further files of the archive")
@@ -179,6 +184,7 @@ class Model3MF:
         self.n_elements = content.count(b"<") - content.count(b"</")
         budget.spend("max_lines", self.n_elements)
         self.has_objects = False
+        self.unread: set[str] = set()
         self.own: dict[str, dict[str, int]] = {"vertex": defaultdict(int), "triangle": defaultdict(int)}
         self.below: dict[str, list[str]] = defaultdict(list)
         self.items: list[str] = []
@@ -193,8 +199,12 @@ class Model3MF:
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
         kind = tag.rpartition("}")[2]
+        if any(name.rpartition("}")[2] in COLORS_3MF for name in attributes):
+            self.unread.add("colours and materials not read")
         if kind in self.own:
             self.own[kind][self._object] += 1
+        elif kind == "beam":
+            self.unread.add("beams not drawn")
         elif kind == "object":
             self.has_objects, self._object = True, attributes.get("id", "")
         elif kind == "item":
@@ -227,16 +237,19 @@ def _parts(scene: Any, source: InputFile) -> Iterator[Mesh]:
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
-    """Keep the messages of trimesh off the terminal; errors give the reason."""
-    import logging
+def quiet(source: InputFile) -> Iterator[None]:
+    """Keep the messages of trimesh off the terminal; its warnings are notes, errors give the reason."""
+    import logging.handlers
 
     logger = logging.getLogger("trimesh")
-    handler = logging.NullHandler()
+    handler = logging.handlers.BufferingHandler(capacity=1 << 16)
+    handler.setLevel(logging.WARNING)
     logger.addHandler(handler)  # a logger without a handler prints its warnings
     nowhere = io.StringIO()
     try:
         with contextlib.redirect_stderr(nowhere), contextlib.redirect_stdout(nowhere), np.errstate(all="ignore"):
             yield
+        for record in handler.buffer:
+            source.notes.add("read with a warning of trimesh", " ".join(record.getMessage().split()))
     finally:
         logger.removeHandler(handler)

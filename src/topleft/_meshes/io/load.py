@@ -35,6 +35,7 @@ GLTF_SUFFIXES = (".gltf", ".glb", ".vrm")
 READERS = {
     **dict.fromkeys(GLTF_SUFFIXES, "gltf.reader.read_gltf"), ".dae": "collada.read_collada", ".obj": "obj.read_obj",
     ".off": "stl_off.read_off", ".ply": "ply.read_ply", ".stl": "stl_off.read_stl", ".stl_ascii": "stl_off.read_stl",
+    ".xyz": "xyz.read_xyz",
 }  # fmt: skip
 """The reader of each suffix, by module and name: it is imported when a file needs it. trimesh reads all others."""
 
@@ -61,6 +62,7 @@ def load(
     max_bytes: int | None = None,
     max_unpacked_bytes: int | None = None,
     scale: float = 1.0,
+    root: str | os.PathLike[str] | None = None,
 ) -> Mesh | Points:
     r"""A mesh read from a file: OBJ, PLY, STL, OFF, COLLADA, glTF and GLB; by trimesh and meshio others.
 
@@ -94,6 +96,8 @@ def load(
         Unless given the first one plays, and `MeshWarning` tells of others.
     scale : float
         Positive. Multiplies the coordinates: 0.001 makes metres of a file in millimetres.
+    root : path, optional
+        A folder whose files the mesh may name, too, as ../textures/a.png, say; of an archive it has no effect.
 
     Returns
     -------
@@ -112,7 +116,7 @@ def load(
     MeshError
         If the file is broken, has no triangles, or is of an unsupported format, or has no such animation.
     ValueError
-        If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
+        If `time` is negative, infinite or NaN, `scale` is not positive and finite, or `root` is no folder.
     MissingPackageError
         If trimesh, meshio, or a package that one needs for this format, is not installed.
 
@@ -123,7 +127,7 @@ def load(
 
     Notes
     -----
-    Files that a mesh names are read from its folder, and from the folders in it; nothing else is opened.
+    Files that a mesh names are read from its folder, the folders in it, and `root`; nothing else is opened.
     docs/guide/files.md lists the contents of each format that are read.
 
     Examples
@@ -144,7 +148,10 @@ def load(
         str(checked), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
         max_nodes=max_nodes, max_lines=max_lines, max_bytes=max_bytes, max_unpacked_bytes=max_unpacked_bytes,
     )  # fmt: skip
-    source = InputFile(checked, budget)
+    home = None if root is None else as_path("root", root)
+    if home is not None and not home.is_dir():
+        raise ValueError(f"root must be a folder, got {str(home)!r}")
+    source = InputFile(checked, budget, home=home)
     source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell(source.notes.lines, stacklevel=2)

@@ -343,9 +343,10 @@ def _materials(text: _Text, source: InputFile) -> tuple[tuple[Material, ...], I6
     names = list(rows)
     use_of_face = np.array(rows_of_use)[at]
     if not any(name in known for name in names):
-        where = "not in its libraries" if text.lines_of(b"mtllib").size else "without a library"
-        for name in names:
-            source.notes.add(f"materials {where}", name)
+        has_library = text.lines_of(b"mtllib").size > 0
+        is_told = any("material libraries" in line for line in source.notes.lines)  # which are missing
+        for name in () if is_told else names:
+            source.notes.add("materials not in its libraries" if has_library else "materials without a library", name)
         return (), None
     materials: list[Material] = []
     place = np.zeros(len(names) + 1, np.int64)

@@ -64,7 +64,7 @@ class InputFile:
     """A mesh file and the files beside it, with their limits and notes of missing ones.
 
     `archive`: that it was unpacked from, which gets its notes and its points. `home`: the folder that it may name files
-    of; the folder of `path` unless given.
+    of beside the folder of `path`.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class InputFile:
         self.clouds: list[Cloud] = [] if archive is None else archive.clouds
         self.moment: Moment | None = None if archive is None else archive.moment
         self._folder = path.parent.resolve()
-        self._home = self._folder if home is None else home
+        self._homes = (self._folder,) if home is None else (self._folder, home.resolve())
         self._is_unpacked = archive is not None
         self._found: dict[tuple[Path, str], Path | None] = {}
         self._resolved: dict[Path, Path] = {}
@@ -123,25 +123,27 @@ class InputFile:
         return self._found[key]
 
     def _looked_for(self, name: str, what: str, folder: Path) -> Path | None:
-        home = self._home
         if name[:5].lower() == "file:":
             name = unquote(name[5:].removeprefix("//").removeprefix("localhost"))
         leads_elsewhere = "\0" in name or re.match(r"/|[A-Za-z][A-Za-z0-9+.-]*:", name) is not None
         try:
             if not leads_elsewhere:
                 found = self._as_spelled(folder / name)
-                if found is not None and found.resolve().is_relative_to(home):
+                if found is not None and self._is_at_home(found):
                     return found
-                leads_elsewhere = not (folder / name).resolve().is_relative_to(home) or found is not None
+                leads_elsewhere = not self._is_at_home(folder / name) or found is not None
             if leads_elsewhere:
                 found = self._as_spelled(folder / name.rpartition("/")[2].replace("\0", ""))
-                if found is not None and found.resolve().is_relative_to(home):
+                if found is not None and self._is_at_home(found):
                     return found
         except (OSError, RuntimeError, ValueError):  # names that no disk can have; circles of links
             pass
         where = "outside of its folder not read" if leads_elsewhere else "not found"
         self.notes.add(f"{what} {where}", name)
         return None
+
+    def _is_at_home(self, path: Path) -> bool:
+        return any(path.resolve().is_relative_to(home) for home in self._homes)
 
     def _as_spelled(self, path: Path) -> Path | None:
         """The file of that name, whatever the case of its letters; no pipe, no device."""
