@@ -21,11 +21,21 @@ typedef struct {
     double weights[3]; /* barycentrics in the source triangle */
 } clip_corner;
 
+#define TL_PASSING_W 0x1p-24 /* half a step of float32 */
+
+/* The w of the cut of an edge that passes the eye, from its end a in front.  Where no near plane cuts afterwards, a w
+ * of TL_MIN_W would give the cut a depth so large that float64 loses the depths in the picture. */
+static inline double passing_w(const clip_corner *a, const tl_view *view)
+{
+    const double w = a->pos[3] * TL_PASSING_W;
+    return view->near_clip || w < TL_MIN_W ? TL_MIN_W : w;
+}
+
 /* Moves a cut point exactly onto its plane: far from the eye rounding may miss the plane by more than the picture. */
-static inline void put_on_plane(double *p, int plane, const tl_view *view)
+static inline void put_on_plane(double *p, int plane, double least_w, const tl_view *view)
 {
     switch (plane) {
-    case 0: p[3] = TL_MIN_W; return;
+    case 0: p[3] = least_w; return;
     case 1: p[2] = view->zero_to_one ? 0.0 : -p[3]; return;
     case 2: p[2] = p[3]; return;
     case 3: p[0] = -(view->guard_band_x * p[3]); return;
@@ -41,12 +51,15 @@ static inline clip_corner cut_edge(const clip_corner *a, const clip_corner *b, d
                                    const tl_view *view)
 {
     clip_corner cut;
+    const double least_w = passing_w(a, view);
+    if (plane == 0)
+        da = a->pos[3] - least_w, db = b->pos[3] - least_w;
     const double of_a = -db / (da - db), of_b = da / (da - db);
     for (int k = 0; k < 4; k++)
         cut.pos[k] = a->pos[k] * of_a + b->pos[k] * of_b;
     for (int k = 0; k < 3; k++)
         cut.weights[k] = a->weights[k] * of_a + b->weights[k] * of_b;
-    put_on_plane(cut.pos, plane, view);
+    put_on_plane(cut.pos, plane, least_w, view);
     return cut;
 }
 

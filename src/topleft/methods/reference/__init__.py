@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 W_MIN = 2.0**-500  # the smallest w that is projected: 1/w stays far from overflow
+PASSING_W = 2.0**-24  # without a near plane edges that pass the eye are cut at this share of w of the end in front
 GUARD_FX = 2.0**60  # sub-pixels from the middle of the picture: inside, every projected vertex has a fixed-point form
 FLOAT32_MAX = 2.0**128 - 2.0**104
 
@@ -167,21 +168,27 @@ class Projection(NamedTuple):
                 if d_here >= 0:
                     walked.append(here)
                 if d_here >= 0 > d_there:
-                    walked.append(self.put_on_plane(cut(here, there, d_here, d_there), k))
+                    walked.append(self.cut(here, there, k))
                 elif d_there >= 0 > d_here:
-                    walked.append(self.put_on_plane(cut(there, here, d_there, d_here), k))
+                    walked.append(self.cut(there, here, k))
             polygon = walked
         return polygon
 
-    def put_on_plane(self, p: Position, k: int) -> Position:
-        """Return a cut with the coordinate that plane k fixes set to its value, which rounding may have missed."""
-        x, y, z, w = p[:4]
+    def cut(self, a: Position, b: Position, k: int) -> Position:
+        """Return the cut by plane k between inside end a and outside end b, equal for all triangles of the edge.
+
+        The coordinate that the plane fixes is set to its value, which rounding may have missed.
+        """
+        least_w = W_MIN if self.near_clip else max(W_MIN, a[3] * PASSING_W)
+        da, db = (end[3] - least_w if k == 0 else self.distances(end)[k] for end in (a, b))
+        of_a, of_b = -db / (da - db), da / (da - db)
+        x, y, z, w, *weights = (p * of_a + q * of_b for p, q in zip(a, b, strict=True))
         x_guard, y_guard = (GUARD_FX / 2.0 ** grid_bits(self.subpixel_bits) / half for half in self.half_px)
         fixed = (
-            (x, y, z, W_MIN), (x, y, 0.0 if self.zero_to_one else -w, w), (x, y, w, w),
+            (x, y, z, least_w), (x, y, 0.0 if self.zero_to_one else -w, w), (x, y, w, w),
             (-(x_guard * w), y, z, w), (x_guard * w, y, z, w), (x, -(y_guard * w), z, w), (x, y_guard * w, z, w),
         )  # fmt: skip
-        return (*fixed[k], *p[4:])
+        return (*fixed[k], *weights)
 
     def vertex(self, p: Position) -> Vertex | None:
         """Divide by w, apply the viewport, snap; None when a cut has lost its digits and left the fixed-point range."""
@@ -201,12 +208,6 @@ class Projection(NamedTuple):
 def grid_bits(subpixel_bits: int | str) -> int:
     """Return the sub-pixel bits that bound how far a vertex may lie: for "exact" the default bits."""
     return 8 if subpixel_bits == "exact" else int(subpixel_bits)
-
-
-def cut(a: Position, b: Position, da: float, db: float) -> Position:
-    """Return the cut between the inside end a and the outside end b, equal to the bit for all triangles of the edge."""
-    of_a, of_b = -db / (da - db), da / (da - db)
-    return tuple(p * of_a + q * of_b for p, q in zip(a, b, strict=True))
 
 
 def _clip_turn(a: Position, b: Position, c: Position) -> int:

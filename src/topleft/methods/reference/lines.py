@@ -69,9 +69,9 @@ def _cut_line(p: Position, q: Position, view: Projection) -> list[End]:
             if dp < 0 and dq < 0:
                 return []
             if dp < 0:
-                p = view.put_on_plane(reference.cut(q, p, dq, dp), k)
+                p = view.cut(q, p, k)
             elif dq < 0:
-                q = view.put_on_plane(reference.cut(p, q, dp, dq), k)
+                q = view.cut(p, q, k)
     vertices = [view.vertex(p), view.vertex(q)]
     return [End(v.xy_fx, v.z) for v in vertices if v] if all(vertices) else []
 
