@@ -9,7 +9,7 @@ from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.edges import EDGE_COLOR, depth_behind
 from topleft._meshes.picture.render import rasterize_mesh, render
-from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST, eye_distance
+from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
 
 SIZE = (64, 48)
 MODES = ["smooth", "flat", "ids", "depth", "normals"]
@@ -92,11 +92,11 @@ def test_id_colors_of_many_ids_differ():
 
 
 @pytest.mark.parametrize("ortho_height", [None, 4])
-def test_eye_distance_inverts_the_depth(ortho_height):
+def test_distance_of_inverts_the_depth(ortho_height):
     camera = Camera.look_at((0, 0, 5), ortho_height=ortho_height, near=1, far=20)
     for z in (3.0, 0.0, -10.0):
         depth = rasterize_mesh(square(z), camera, (5, 5)).depth[2:3, 2]
-        assert eye_distance(depth, camera) == pytest.approx([5 - z], rel=1e-4)  # float32 depth
+        assert camera.distance_of(depth) == pytest.approx([5 - z], rel=1e-4)  # float32 depth
 
 
 def test_render_depth_is_brighter_the_nearer():

@@ -106,11 +106,13 @@ class ClusteredMesh(BoxView):
         return Survey(*(count / n for count in n_of.tolist()))
 
     def share_clipped(self) -> float:
-        """Return the share of the vertices that lie beyond the near or far plane, by some of them."""
-        points, matrix = self.clusters.points, np.asarray(self._view.transform, np.float64)
+        """Return the share of the vertices that lie beyond the near or far plane or the eye, by some of them."""
+        view, points = self._view, self.clusters.points
+        matrix = np.asarray(view.transform, np.float64)
         some = points[:: max(1, len(points) // SURVEYED_OF_SAMPLES)].astype(np.float64)
         z, w = (engine.product(some, matrix[2:, :3].T) + matrix[2:, 3]).T
-        is_beyond = (z < (0.0 if self._view.zero_to_one else -w)) | (z > w)
+        is_before = z < (0.0 if view.zero_to_one else -w) if view.near_clip else w <= 0
+        is_beyond = (is_before | (z > w)) if view.far_clip else is_before
         return float(is_beyond.mean()) if len(some) else 0.0
 
     def pays(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +51,15 @@ from topleft._meshes.model.normals import moved
 from topleft._meshes.model.points import Points
 from topleft._meshes.model.pose import as_pose
 from topleft._meshes.scene.scene import Scene
-from topleft.typing import FitOption, UpOption
+from topleft.typing import ClipDepthOption, FitOption, UpOption
+
+
+class ClipOptions(TypedDict, total=False):
+    """The options of `rasterize` that tell how clip space is cut."""
+
+    clip_depth: ClipDepthOption
+    near_clip: bool
+    far_clip: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +78,11 @@ class Camera:
         a picture of another shape is stretched.
     lens : OpenCVLens or FisheyeLens, optional
         Bends the rays before `projection`, which must have perspective, sees them; without one they are straight.
+    has_planes : bool
+        Whether the near and far planes of `projection` cut what is drawn. False for a camera that is made without
+        `near=` and `far=`: pictures show all that lies in front of the eye, and depth is measured without planes, as
+        -1 / distance along the view, or without perspective as that distance. Only `clip_from_world` and
+        `clip_from_eye` have planes then.
 
     Raises
     ------
@@ -89,12 +102,14 @@ class Camera:
     projection: F64
     aspect: float | None = None
     lens: Lens | None = None
+    has_planes: bool = True
 
     if TYPE_CHECKING:  # anything that NumPy reads may be given; float64 is kept
 
         def __init__(
-            self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None, lens: Lens | None = None
-        ) -> None: ...
+            self, view: npt.ArrayLike, projection: npt.ArrayLike, aspect: float | None = None,
+            lens: Lens | None = None, has_planes: bool = True,
+        ) -> None: ...  # fmt: skip
 
     __setstate__ = set_read_only
 
@@ -159,6 +174,30 @@ class Camera:
             projection[0] /= width
         return projection
 
+    def drawn_from_world(self, size: int | tuple[int, int]) -> F64:
+        """The matrix (4, 4) float64 of pictures: `clip_from_world`, with depth as `has_planes` says."""
+        return engine.product(self.drawn_from_eye(size), self.view)
+
+    def drawn_from_eye(self, size: int | tuple[int, int]) -> F64:
+        """The projection (4, 4) float64 of pictures: `clip_from_eye`, with depth as `has_planes` says."""
+        projection = self.clip_from_eye(size)
+        if not self.has_planes:
+            projection[2] = (0, 0, 0, -1) if projection[3, 2] else (0, 0, -1, 0)
+        return projection
+
+    @property
+    def depth_options(self) -> ClipOptions:
+        """The options of `rasterize` that belong to `drawn_from_world`."""
+        if self.has_planes:
+            return {}
+        return {"clip_depth": "zero_to_one", "near_clip": not self.projection[3, 2], "far_clip": False}
+
+    def distance_of(self, depth: npt.NDArray[Any]) -> F64:
+        """Distance along the view, world units, of depths in a picture."""
+        (a, b), (c, d) = self.drawn_from_eye((1, 1))[2:, 2:]
+        ndc = 2.0 * depth.astype(np.float64) - 1 if self.has_planes else depth.astype(np.float64)
+        return (ndc * d - b) / (ndc * c - a)
+
     def straightened(self) -> Camera:
         """The camera without its lens."""
         return self if self.lens is None else replace(self, lens=None)
@@ -179,7 +218,7 @@ class Camera:
         Returns
         -------
         (N, 3) float64
-            x and y in pixels (the centre of the top-left pixel is (0.5, 0.5)) and window depth, 0 near and 1 far.
+            x and y in pixels (the centre of the top-left pixel is (0.5, 0.5)) and depth as `rasterize_mesh` has it.
             Whatever a point behind the eye gives is not in the picture.
 
         Raises
@@ -196,7 +235,7 @@ class Camera:
         if world.ndim != 2 or world.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), got {world.shape}")
         eye = moved(world, self.view)
-        return pixels_of(eye if self.lens is None else self.lens.bend(eye), self.clip_from_eye(size), size)
+        return pixels_of(eye if self.lens is None else self.lens.bend(eye), self, size)
 
     @classmethod
     def from_matrix(cls, clip_from_world: npt.ArrayLike) -> Camera:
@@ -329,7 +368,8 @@ class Camera:
         ortho_height : float, optional
             Makes the camera orthographic, with that many world units from bottom to top.
         near, far : float, optional
-            Distances of the planes; a hundredth and a hundred times the distance of the target unless given.
+            Distances of the planes. With neither nothing is cut in front of the eye: see `has_planes`. Of one that is
+            given alone the other is a hundredth, or a hundred times, the distance of the target.
 
         Raises
         ------
@@ -338,12 +378,14 @@ class Camera:
         """
         eye, target, up = as_vector("eye", eye), as_vector("target", target), as_vector("up", up)
         view = view_matrix(eye, target, up)
-        distance = engine.length(target - eye)
+        distance, has_planes = engine.length(target - eye), not (near is None and far is None)
         near = 0.01 * distance if near is None else near
         far = 100 * distance if far is None else far
         if ortho_height is not None:
-            return cls.orthographic(view, near=near, far=far, height=as_positive("ortho_height", ortho_height))
-        return cls.perspective(view, near=near, far=far, fov_y_deg=fov_y_deg)
+            projection = orthographic_matrix(as_positive("ortho_height", ortho_height), near, far)
+        else:
+            projection = perspective_matrix(fov_y_deg, near, far)
+        return cls(view, projection, aspect=1.0, has_planes=has_planes)
 
     @classmethod
     def from_intrinsics(
@@ -370,9 +412,10 @@ class Camera:
         size : (width, height), pixels
             The picture that the intrinsics belong to. A picture rendered at another size is that one, scaled.
         near, far : float, optional
-            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres. Unless given
-            a thousandth of the distance d of the world's origin, and a thousand times the larger of d and 1; d counts
-            as 1 for a camera at the origin.
+            Distances of the planes along z, world units, 0 < near < far. With `fisheye` they are spheres. With neither
+            nothing is cut in front of the eye: see `has_planes`. Of one that is given alone the other is a thousandth
+            of the distance d of the world's origin, or a thousand times the largest of d, 1 and `near`; d counts as 1
+            for a camera at the origin.
         distortion : (4,), (5,), (8,), (12,) or (14,) array_like, optional
             `k1, k2, p1, p2[, k3[, k4, k5, k6[, s1, s2, s3, s4[, tau_x, tau_y]]]]`, as `cv2.calibrateCamera` returns
             them.
@@ -396,6 +439,7 @@ class Camera:
         matrix = as_square("intrinsics", intrinsics, 3)
         pose = as_pose("camera_from_world", camera_from_world)
         width, height = as_size(size, smallest=1)
+        has_planes = not (near is None and far is None)
         near, far = planes_for(engine.length(pose[:3, 3]), near, far)
         if not np.array_equal(matrix[2], [0, 0, 1]):
             raise ValueError(f"the last row of intrinsics must be [0, 0, 1], got {matrix[2].tolist()}")
@@ -409,7 +453,8 @@ class Camera:
         projection = perspective_matrix(90, near, far)
         ndc_of_matrix = engine.product(engine.product(ndc_of_px, px_of_center), matrix)
         projection[:2, :3] = engine.product(ndc_of_matrix[:2], eye_of_camera[:3, :3])
-        return cls(engine.product(eye_of_camera, pose), projection, lens=lens_of_opencv(distortion, fisheye))
+        view, lens = engine.product(eye_of_camera, pose), lens_of_opencv(distortion, fisheye)
+        return cls(view, projection, lens=lens, has_planes=has_planes)
 
     @classmethod
     def from_opengl(
@@ -459,9 +504,10 @@ class Camera:
         if intrinsics is None:
             if not (size is None and distortion is None and fisheye is None):
                 raise ValueError("size, distortion and fisheye need intrinsics; without them fov_y_deg sets the view")
+            has_planes = not (near is None and far is None)
             near, far = planes_for(engine.length(pose[:3, 3]), near, far)
-            fov_y_deg = DEFAULT_FOV_Y_DEG if fov_y_deg is None else fov_y_deg
-            return cls.perspective(np.append(FLIP, 1)[:, None] * pose, near=near, far=far, fov_y_deg=fov_y_deg)
+            projection = perspective_matrix(DEFAULT_FOV_Y_DEG if fov_y_deg is None else fov_y_deg, near, far)
+            return cls(np.append(FLIP, 1)[:, None] * pose, projection, aspect=1.0, has_planes=has_planes)
         if fov_y_deg is not None or size is None:
             raise ValueError("intrinsics need the size of their picture, and no fov_y_deg")
         return cls.from_intrinsics(
@@ -661,19 +707,20 @@ class Camera:
 
 
 def planes_for(away: float, near: float | None, far: float | None) -> tuple[float, float]:
-    """The planes given, or default ones for a camera at this distance from the world's origin."""
+    """The planes given, or those of `Camera.clip_from_world` for a camera at this distance from the world's origin."""
     near = 1e-3 * (away or 1.0) if near is None else near
     far = max(1e3 * max(away or 1.0, 1.0), 1e3 * as_number("near", near)) if far is None else far
     return as_planes(near, far)
 
 
-def pixels_of(points_eye: F64, projection: F64, size: tuple[int, int]) -> F64:
+def pixels_of(points_eye: F64, camera: Camera, size: tuple[int, int]) -> F64:
     """The pixels of points in eye space that a lens has bent, as in `Camera.project`."""
-    width, height = size
+    (width, height), projection = size, camera.drawn_from_eye(size)
     clip = engine.product(points_eye, projection[:, :3].T) + projection[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ndc = clip[:, :3] / clip[:, 3:]
-    return np.stack([(ndc[:, 0] + 1) * (width / 2), (1 - ndc[:, 1]) * (height / 2), (ndc[:, 2] + 1) / 2], axis=1)
+        x, y, z = (clip[:, :3] / clip[:, 3:]).T
+    depth = (z + 1) / 2 if camera.has_planes else z
+    return np.stack([(x + 1) * (width / 2), (1 - y) * (height / 2), depth], axis=1)
 
 
 CameraLike: TypeAlias = Camera | npt.NDArray[Any]

@@ -24,6 +24,7 @@ from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import FRESH, check_fits
 from topleft._core.base.options import parse
 from topleft._core.base.threads import run_parts, threads_for
+from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import overdraw, rasterize
 from topleft._meshes.camera.camera import Camera, CameraLike, as_camera
 from topleft._meshes.lod.distance import TriangleTree
@@ -353,8 +354,8 @@ def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: st
     def add(picture: U8, camera: Camera) -> None:
         size = picture.shape[1], picture.shape[0]
         frags = rasterize_mesh(mesh, camera, size, cull="none", threads=chart.n_threads)
-        light, clip, eye = LIGHT_OF_SRGB[picture[..., :3]], camera.clip_from_world(size), eye_of(camera)
-        what = frags.triangle, frags.depth, light, clip, eye, blend == "best", points, normals, flat
+        light, (clip, depth), eye = LIGHT_OF_SRGB[picture[..., :3]], depth_of(frags, camera), eye_of(camera)
+        what = frags.triangle, depth, light, clip, eye, blend == "best", points, normals, flat
 
         def add_texels(first: int, end: int) -> None:
             engine.add_taken(*what, first, end, sums, weights)
@@ -370,6 +371,16 @@ def from_pictures(chart: Chart, pictures: Sequence[tuple[U8, Camera]], blend: st
     values = srgb_tables()[1][steps].reshape(*ids.shape, 3)
     triangle = np.where(is_seen.reshape(ids.shape), ids, np.int32(-1))
     return Baked(values, triangle, triangle >= 0)
+
+
+def depth_of(frags: Fragments, camera: Camera) -> tuple[F64, F32]:
+    """The matrix of a picture, clip from world, and window depths (H, W) that agree with it; 1 is the largest."""
+    height, width = frags.depth.shape
+    clip, depth = camera.drawn_from_world((width, height)), frags.depth
+    if not camera.has_planes:
+        largest = float(np.abs(depth[frags.mask]).max(initial=1e-300))
+        clip[2], depth = clip[2] * (2 / largest) - clip[3], depth / np.float32(largest)  # depth is (z / w + 1) / 2
+    return clip, depth
 
 
 def eye_of(camera: Camera) -> F64:

@@ -65,14 +65,15 @@ def save_layers(
         * .tif, .tiff: pictures and masks (0 and 255) of 8 bits; all else as it is, float32 or int32; of several
           channels each is a page.
         * .png: pictures and masks as in TIFF; normals and barycentrics of 8 bits. Numbers (H, W) of 16 bits, 0 where
-          nothing is: ids plus 1; distances in thousandths, millimetres if units are metres; depth, 0 to 1 as 1 to
-          65535; others from the least, 1, to the greatest, 65535.
+          nothing is: ids plus 1; distances in thousandths, millimetres if units are metres; depth that lies in
+          0 to 1, as 1 to 65535; others from the least, 1, to the greatest, 65535.
         * .jpg, .webp: pictures and masks.
     layers : mapping of str to ndarray
     scale : float, optional
         Steps a unit for numbers in PNG that are no ids, instead of these.
     matrix : (4, 4) float64, optional
-        Clip space from the world; goes into .npz with the layers, as `clip_from_world`.
+        Clip space from the world; goes into .npz with the layers, as `clip_from_world`. Its planes are not those of the
+        depth of a camera that has none.
     background : (3,) of 0 to 255
         The colour behind in JPEG.
     """
@@ -126,7 +127,9 @@ def _numbers_of_16_bits(
         step, offset = 1 / (MILLIMETRES if scale is None else float(scale)), 0.0
         steps = np.rint(numbers / step)
     else:
-        ends = (0.0, 1.0) if name == "depth" or not numbers.size else (float(numbers.min()), float(numbers.max()))
+        ends = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 1.0)
+        if name == "depth" and 0 <= ends[0] <= ends[1] <= 1:
+            ends = 0.0, 1.0
         step = (ends[1] - ends[0]) / (LARGEST - 1)
         offset = ends[0] - step
         steps = 1 + np.rint((numbers - ends[0]) / step) if step else np.ones(numbers.shape)

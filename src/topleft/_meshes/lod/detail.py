@@ -236,7 +236,10 @@ def screen_error_of(
     camera: Camera, size: tuple[int, int], viewport: tuple[int, int] | None, origin: tuple[int, int]
 ) -> ScreenError:
     """The scale of errors in a view: from object units to pixels."""
-    return ScreenError(camera.clip_from_world(viewport or size), viewport or size, window_of(size, viewport, origin))
+    matrix = camera.clip_from_world(viewport or size)
+    if not camera.has_planes and matrix[3, :3].any():  # the eye alone cuts
+        matrix[2] = 0
+    return ScreenError(matrix, viewport or size, window_of(size, viewport, origin))
 
 
 def check_tolerance(tolerance: float) -> float:

@@ -24,7 +24,7 @@ from topleft._meshes.camera.lens import Lens
 from topleft._meshes.model.light import TO_HEADLIGHT, Light
 from topleft._meshes.model.normals import moved, turn_of_normals, unit_or_zero
 from topleft._meshes.model.points import Points
-from topleft._meshes.picture.shade import ShadingOptions, eye_distance, shade_each, shade_numbers
+from topleft._meshes.picture.shade import ShadingOptions, shade_each, shade_numbers
 
 NOWHERE_PX = 1e12
 """The place of points that a lens does not see: outside of every window."""
@@ -48,7 +48,7 @@ class CloudShot:
         positions: npt.NDArray[Any] = cloud.positions
         sizes: float | F64 = cloud.size
         if camera.lens is None:
-            options["transform"] = camera.clip_from_world(frame)
+            options |= {"transform": camera.drawn_from_world(frame), **camera.depth_options}
         if camera.lens is not None or cloud.unit != "px":
             eye = moved(positions, camera.view)
             bent = eye if camera.lens is None else camera.lens.bend(eye)
@@ -58,7 +58,7 @@ class CloudShot:
                 scale = unit_of_eye * abs(float(projection[1, 1])) * frame[1] / 2
                 sizes = np.asarray(cloud.size) * scale / w_of(bent, projection)
             if camera.lens is not None:
-                positions = through_lens(eye, bent, camera.lens, projection, frame)
+                positions = through_lens(eye, bent, camera, camera.lens, frame)
         view = View.parse(self.size, cast(ViewOptions, options), why_snapped="the corners of points lie on the grid")
         refuse_many(view, "a cloud")
         view.refuse_classic("points")
@@ -77,12 +77,13 @@ class CloudShot:
         return frags.mask if is_seen.shape[-1] == 1 else is_seen.mean(axis=-1, dtype=np.float32)
 
 
-def through_lens(eye: F64, bent: F64, lens: Lens, projection: F64, frame: tuple[int, int]) -> F64:
+def through_lens(eye: F64, bent: F64, camera: Camera, lens: Lens, frame: tuple[int, int]) -> F64:
     """Where points in eye space lie in the picture of a lens, which bends them: pixels and depth (N, 3)."""
     with np.errstate(all="ignore"):
-        places = pixels_of(bent, projection, frame)
+        places = pixels_of(bent, camera, frame)
         _, angle = engine.off_axis(eye * [1, 1, -1])
-    is_seen = np.isfinite(places).all(axis=1) & (places[:, 2] >= 0) & (places[:, 2] <= 1)
+    is_seen = np.isfinite(places).all(axis=1)
+    is_seen &= (places[:, 2] >= 0) & (places[:, 2] <= 1) if camera.has_planes else places[:, 2] < 0
     places[~(is_seen & (angle < lens.max_angle))] = NOWHERE_PX, NOWHERE_PX, 0
     return places
 
@@ -127,7 +128,7 @@ def colors_of(ids: npt.NDArray[np.int32], depth: F32, cloud: Points, camera: Cam
         light *= light_at(cloud, camera, rows, options)
     if options.fog is None:
         return encode[steps_of(light)][row_of[ids]]
-    way = (eye_distance(depth, camera) - options.fog.near) / (options.fog.far - options.fog.near)
+    way = (camera.distance_of(depth) - options.fog.near) / (options.fog.far - options.fog.near)
     share = way.clip(0, 1)[:, None]
     behind = np.array(light_of(options.fog.color)[:3])
     return encode[steps_of(light[row_of[ids]] * (1 - share) + behind * share)]

@@ -14,12 +14,14 @@ import numpy.typing as npt
 from topleft._core.base.array_types import F64
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.verbs import wireframe
+from topleft._meshes.camera.camera import Camera
 from topleft._meshes.picture.placed import Mask, Placed
 from topleft._meshes.picture.shade import ShadingOptions
 from topleft._meshes.scene.scene import Instance
 from topleft.typing import CullOption
 
 EDGE_COLOR = (24, 28, 40)
+EDGE_BIAS = 2.0**-10  # of depth: edges that lie behind by less show
 TURNED: Mapping[str, CullOption] = {"back": "front", "front": "back"}
 
 
@@ -32,7 +34,9 @@ def draw_all_edges(
     cull: CullOption | None,
 ) -> None:
     """Draw the edges of every instance that the visibility buffer does not hide."""
-    behind = depth_behind(frags.depth)
+    behind, camera = depth_behind(frags.depth), placed.camera
+    if not camera.has_planes:  # depth has no unit that the bias of lines could be given in
+        behind += EDGE_BIAS * np.abs(frags.depth)
     for i, instance in enumerate(placed.whole):
         mesh = instance.mesh
         is_single = None if cull is not None else mesh.single_sided(options.material or instance.material)
@@ -45,7 +49,7 @@ def draw_all_edges(
             if placed.bent is not None:
                 vertices, transform = placed.bent[i].points_eye, placed.clip_from_world
                 triangles, side = placed.bent[i].outline(transform, side, mask), "none"
-            draw_edges(picture, behind, vertices, triangles, transform, side, threads=options.threads)
+            draw_edges(picture, behind, vertices, triangles, transform, side, camera, threads=options.threads)
 
 
 def cull_of(cull: CullOption, instance: Instance) -> CullOption:
@@ -60,14 +64,15 @@ def draw_edges(
     triangles: npt.NDArray[Any],
     transform: F64,
     cull: CullOption,
+    camera: Camera,
     *,
     threads: int | None,
 ) -> None:
     """Draw the edges of triangles over the picture (H, W, 4), where they are not behind a depth (H, W)."""
     size = depth.shape[::-1]
     lines = wireframe(
-        vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull,
-        threads=threads,
+        vertices, triangles, size, transform=transform, depth=depth, antialias=True, cull=cull, threads=threads,
+        depth_bias=EDGE_BIAS if camera.has_planes else 0.0, **camera.depth_options,
     )  # fmt: skip
     on = lines > 0
     share = lines[on][:, None]

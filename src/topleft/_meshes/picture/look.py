@@ -263,8 +263,7 @@ class ShadingInputs:
         if has_perspective:
             start, way = 0.0, 1.0 / -float(self.camera.projection[3, 2])
         else:
-            (a, b), (c, d) = self.camera.projection[2:, 2:]
-            near, far = ((ndc * d - b) / (ndc * c - a) for ndc in (-1.0, 1.0))
+            near, far = self.camera.distance_of(np.array([0.0, 1.0])).tolist()
             start, way = near, far - near
         return CameraRays(has_perspective, rows[0], rows[1:5], rows[5:8], rows[8], scale, start, way)
 

@@ -113,9 +113,9 @@ class Placed:
         camera, whole = shot.camera, shot.scene
         if camera.lens is not None:
             scene, bent = bend_scene(whole, camera, camera.lens, view.viewport, near_clip=view.near_clip)
-            matrix = camera.clip_from_eye(view.viewport)
+            matrix = camera.drawn_from_eye(view.viewport)
             return cls(scene, whole, camera, matrix, view, bent, shot.is_mesh, with_depth, material)
-        matrix = camera.clip_from_world(view.viewport)
+        matrix = camera.drawn_from_world(view.viewport)
         placed = cls(whole, whole, camera, matrix, view, None, shot.is_mesh, with_depth, material)
         if mesh_view is not None:
             placed._last = 0, mesh_view.but(transform=matrix, static=whole[0].mesh)
@@ -126,7 +126,7 @@ class Placed:
         cls, shot: Shot, options: dict[str, Any], material: Material | None = None, *, with_depth: bool = True
     ) -> Placed:
         """Place a shot by the options of a verb, which are checked; `with_depth`: the verb gives ids and depth."""
-        view = View.parse(shot.size, cast(ViewOptions, options))
+        view = View.parse(shot.size, cast(ViewOptions, options | shot.camera.depth_options))
         if with_depth:
             view.refuse_classic("depth")
             refuse_many(view, "rasterize")

@@ -201,6 +201,7 @@ def render(
     shot = Shot.of(mesh, camera, size)
     if isinstance(shot, CloudShot):
         return shot.render(view, ShadingOptions.parse(**given), edges=edges)
+    view |= shot.camera.depth_options
     options = PictureOptions.of(shot, view, given)
     if not (type(tolerance) is float and tolerance == 0):
         in_parts = not edges and options.blended is None

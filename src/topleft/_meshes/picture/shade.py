@@ -302,16 +302,9 @@ def opaque(colors: U8) -> U8:
 def greys_of(depth: F32, camera: Camera, ends: tuple[float, float]) -> U8:
     """The greys (P, 3) of depths: near ones are bright, the ends of the range are neither black nor white."""
     nearest, farthest = ends
-    share = np.clip((eye_distance(depth, camera) - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
+    share = np.clip((camera.distance_of(depth) - nearest) / max(farthest - nearest, np.finfo(np.float64).tiny), 0, 1)
     grey = np.rint(GREY_OF_NEAREST + (GREY_OF_FARTHEST - GREY_OF_NEAREST) * share).astype(np.uint8)
     return np.repeat(grey[:, None], 3, axis=1)
-
-
-def eye_distance(depth: F32, camera: Camera) -> F64:
-    """Distance along the view, world units, of window depths in [0, 1]: `-z` in eye space."""
-    (a, b), (c, d) = camera.projection[2:, 2:]
-    ndc = 2.0 * depth.astype(np.float64) - 1
-    return (ndc * d - b) / (ndc * c - a)
 
 
 def distances(seen: SampleBuffers, camera: Camera) -> tuple[float, float]:
@@ -322,7 +315,7 @@ def distances(seen: SampleBuffers, camera: Camera) -> tuple[float, float]:
         depth = np.append(depth, others[ids >= 0])
     if not depth.size:
         return 0.0, 0.0
-    ends = eye_distance(np.array([depth.min(), depth.max()]), camera)
+    ends = camera.distance_of(np.array([depth.min(), depth.max()]))
     return float(ends[0]), float(ends[1])
 
 

@@ -182,7 +182,7 @@ def render_layers(
         color          (H, W, 4) u8   as given   the picture of `render`
         alpha          (H, W) u8      0          how much of the pixel is covered, of 255
         silhouette     (H, W) bool    False      where the mesh is; with several samples their share, float32
-        depth          (H, W) f32     +inf       window depth, 0 near to 1 far
+        depth          (H, W) f32     +inf       window depth, 0 near to 1 far, or as `Camera.has_planes` says
         distance       (H, W) f32     +inf       along the view, world units ("metric z")
         ray_distance   (H, W) f32     +inf       from the eye; without perspective the same as distance
         triangle       (H, W) i32     -1         index of the triangle in its mesh

@@ -352,7 +352,8 @@ def plan_mesh(
     if "transform" in options:
         raise ValueError("transform is that of the camera: give either")
     viewport = options.get("viewport")
-    options["transform"] = camera.clip_from_world(viewport or size)
+    options["transform"] = camera.drawn_from_world(viewport or size)
+    options.update(camera.depth_options)
     detail = choose_detail(
         mesh, camera, size, tolerance=tolerance, cull=options.get("cull"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
