@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 import numpy as np
@@ -185,7 +186,18 @@ class Camera:
             projection[2] = (0, 0, 0, -1) if projection[3, 2] else (0, 0, -1, 0)
         return projection
 
-    @property
+    @cached_property
+    def projection_mirrors(self) -> bool:
+        """Whether `projection` shows eye space in a mirror: a focal length is negative, say."""
+        forward = self.projection[3, :3] if self.projection[3, :3].any() else np.array([0.0, 0.0, -1.0])
+        return bool(engine.determinant(np.stack([*self.projection[:2, :3], forward])) > 0)
+
+    @cached_property
+    def is_mirrored(self) -> bool:
+        """Whether pictures show the world in a mirror, by the view or the projection: `cull` takes the other side."""
+        return bool(engine.determinant(self.view[:3, :3]) < 0) != self.projection_mirrors
+
+    @cached_property
     def depth_options(self) -> ClipOptions:
         """The options of `rasterize` that belong to `drawn_from_world`."""
         if self.has_planes:

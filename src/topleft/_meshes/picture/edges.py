@@ -40,9 +40,9 @@ def draw_all_edges(
     for i, instance in enumerate(placed.whole):
         mesh = instance.mesh
         is_single = None if cull is not None else mesh.single_sided(options.material or instance.material)
-        sides: list[tuple[Mask | None, CullOption]] = [(None, cull_of(cull or "none", instance))]
+        sides: list[tuple[Mask | None, CullOption]] = [(None, cull_of(cull or "none", instance, camera))]
         if is_single is not None:  # single-sided triangles have edges on their fronts alone
-            sides = [(is_single == 0, "none"), (is_single == 1, cull_of("back", instance))]
+            sides = [(is_single == 0, "none"), (is_single == 1, cull_of("back", instance, camera))]
         for mask, side in sides:
             vertices, transform = mesh.vertices, placed.clip_from_objects[i]
             triangles: npt.NDArray[Any] = mesh.triangles if mask is None else mesh.triangles[mask]
@@ -52,9 +52,9 @@ def draw_all_edges(
             draw_edges(picture, behind, vertices, triangles, transform, side, camera, threads=options.threads)
 
 
-def cull_of(cull: CullOption, instance: Instance) -> CullOption:
-    """The option `cull` for an instance, turned over where it is mirrored."""
-    return TURNED.get(cull, cull) if instance.is_mirrored else cull
+def cull_of(cull: CullOption, instance: Instance, camera: Camera) -> CullOption:
+    """The option `cull` for an instance, turned over where it shows in a mirror."""
+    return TURNED.get(cull, cull) if instance.is_mirrored != camera.is_mirrored else cull
 
 
 def draw_edges(

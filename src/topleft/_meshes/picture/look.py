@@ -82,7 +82,7 @@ class ShadingMesh:
         self.colors = None if mesh.colors is None else color_rows(mesh.colors)
         if self.colors is not None and mesh.color_interpolation == "linear":
             self.colors[:, :3] = LIGHT_OF_SRGB[mesh.colors[:, :3]]  # type: ignore[index]
-        self.tables: dict[tuple[Surface, bool], engine.ShadingTable] = {}  # see `table_of`
+        self.tables: dict[tuple[Surface, bool, bool], engine.ShadingTable] = {}  # see `table_of`
 
     @cached_property
     def face_normals(self) -> F32:
@@ -166,20 +166,32 @@ class Surface:
         return any(one.is_metallic_rough for one in self.materials)
 
 
-def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool) -> engine.ShadingTable:
-    """The kernels' inputs of a mesh, without a view; the last ones are kept."""
-    kept = own.tables.get((surface, is_mirrored))
+def table_of(
+    own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: bool, projection_mirrors: bool
+) -> engine.ShadingTable:
+    """The kernels' inputs of a mesh, without a view; the last ones are kept.
+
+    `is_mirrored`: the picture shows the mesh in a mirror; `projection_mirrors`: by the projection, of which the shading
+    mesh knows nothing: the kernels take the side of normals from the turn of triangles in the picture.
+    """
+    key = surface, is_mirrored, projection_mirrors
+    kept = own.tables.get(key)
     if kept is not None:
         return kept
     is_flat = surface.is_flat or mesh.is_faceted
+    face_normals, is_turned = (own.face_normals, None) if is_flat else (None, own.is_turned)
+    if projection_mirrors and face_normals is not None:
+        face_normals = face_normals * np.array([-1, -1, -1, 1], np.float32)
+    elif projection_mirrors:
+        is_turned = np.ones(len(mesh.triangles), np.uint8) if is_turned is None else 1 - is_turned
     table = engine.ShadingTable(
         own.normals,
         own.center.tolist(),
         own.normal_of_corner,
         own.normals,
-        own.face_normals if is_flat else None,
+        face_normals,
         own.positions,
-        None if is_flat else own.is_turned,
+        is_turned,
         mesh.uv,
         mesh.uv1,
         own.colors,
@@ -192,7 +204,7 @@ def table_of(own: ShadingMesh, mesh: Mesh, surface: Surface, *, is_mirrored: boo
     table.set_materials([material_row(one, mesh, surface, back_side) for one in surface.materials])
     if len(own.tables) == MOST_LOOKS:
         own.tables.clear()
-    own.tables[surface, is_mirrored] = table
+    own.tables[key] = table
     return table
 
 
@@ -246,7 +258,9 @@ class ShadingInputs:
         self.camera, self.places, self.views, kept = camera, places, views, []
         for k, (is_mirrored, stretch) in enumerate(engine.stretches(views)):
             _, mesh, surface = shown[k]
-            kept.append(table_of(shading_mesh_of(mesh, stretch), mesh, surface, is_mirrored=is_mirrored))
+            turns = camera.projection_mirrors
+            own = shading_mesh_of(mesh, stretch)
+            kept.append(table_of(own, mesh, surface, is_mirrored=is_mirrored != turns, projection_mirrors=turns))
             if stretch is not None:
                 back = engine.inverse(stretch)
                 views[k], places[k] = engine.product(views[k], back), engine.product(places[k], back)

@@ -43,7 +43,7 @@ TRIANGLES_AT_ONCE = 1 << 21
 #: Runs of instances that cull alike, each drawn as one mesh.
 MOST_JOINED = 8
 
-#: cull codes of a view (tl_cull) for an instance that mirrors.
+#: cull codes of a view (tl_cull) for an instance or a camera that mirrors.
 MIRRORED = np.array([0, 2, 1], np.int32)
 
 
@@ -282,7 +282,7 @@ class Placed:
                 is_mixed[at] = is_single is not None
             found = kept[key] = sides, is_mixed
         culls, is_mixed = found
-        is_mirrored = self.scene.are_mirrored
+        is_mirrored = self.scene.are_mirrored != self.camera.is_mirrored
         return (np.where(is_mirrored, MIRRORED[culls], culls) if is_mirrored.any() else culls), is_mixed
 
     @cached_property
@@ -341,7 +341,7 @@ class Placed:
 
     def _make_view(self, i: int) -> View:
         one, (cull, is_single) = self.scene[i], self._sides_of(self.whole[i])
-        is_mirrored, single_sided = one.is_mirrored, None
+        is_mirrored, single_sided = one.is_mirrored != self.camera.is_mirrored, None
         if is_single is not None:
             back = CULL_CODES["front" if is_mirrored else "back"]
             single_sided = is_single if self.bent is None else is_single[self.bent[i].source], back

@@ -85,7 +85,7 @@ class PictureOptions:
         try:
             kinds = *map(type, look["color"]), None, *map(type, look["background"])  # (1.0, 0, 0) is red
             values = *view.values(), *look.values()
-            key = shot.size, *look, *values, *map(type, values), *kinds
+            key = shot.size, shot.camera.is_mirrored, *look, *values, *map(type, values), *kinds
             found = subject.cache.pictures.get(key)
         except TypeError:  # a list, say
             return cls.parse(shot, view, look)
