@@ -169,7 +169,7 @@ static void label_by_bits(const tl_polygons *p, int64_t polygon, const tl_label_
     const row_frame f = place_rows(p, top, bottom, job->width);
     const int64_t stride = tl_polygon_stride(job->width), n_words = stride >> 6, n_rows = bottom - top;
     uint64_t *bits = (uint64_t *)job->cells;
-    if (p->is_nonzero) { /* the bits of a row overwrite its sums */
+    if (p->is_nonzero[polygon]) { /* the bits of a row overwrite its sums */
         const crossing_sink s = {.stride = stride, .cells = job->cells};
         walk_to_cells(p, polygon, &f, &s);
         for (int64_t r = 0; r < n_rows; r++)
@@ -220,7 +220,7 @@ TL_INLINE void label_polygon(const tl_polygons *p, int64_t polygon, const tl_lab
             return;
         }
         if ((int64_t)n * (high - low) <= TL_LABEL_ROOM) {
-            label_by_lists(job, n_bytes, p->is_nonzero, n, low, high, value);
+            label_by_lists(job, n_bytes, p->is_nonzero[polygon], n, low, high, value);
             return;
         }
     }

@@ -95,14 +95,16 @@ static void note_left(piece_row *w, const tl_edge_piece *e)
     note_change(w, e->tb, -e->sign);
 }
 
-/* Sets the shares of columns [left, right) of a row from its n pieces: shares[column - left]. */
-static void resolve_row(const tl_polygons *p, const tl_edge_piece *pieces, int64_t n, int64_t left, int64_t right,
-                        const tl_piece_scratch *scratch, double *shares)
+/* Sets the shares of the columns of a polygon's box in a row from its n pieces: shares[column - box->left]. */
+static void resolve_row(const tl_polygons *p, int64_t polygon, const tl_edge_piece *pieces, int64_t n,
+                        const tl_polygon_box *box, const tl_piece_scratch *scratch, double *shares)
 {
+    const int64_t left = box->left, right = box->right;
     int64_t *room = scratch->room;
     const int64_t n_room = scratch->n_pieces;
     keyed *pairs = (keyed *)room, *other = pairs + n_room;
     piece_row w = {.p = p, .pieces = pieces, .pixel = 1.0 / (double)((int64_t)1 << p->bits)};
+    w.is_nonzero = p->is_nonzero[polygon];
     room += 4 * n_room;
     w.events = (keyed *)room, w.spare = w.events + 3 * n_room, room += 12 * n_room;
     w.edges = (slab_edge *)room, w.moved = w.edges + n_room, room += 8 * n_room;
@@ -172,7 +174,7 @@ static void resolve_polygon(const tl_polygons *p, int64_t polygon, const tl_poly
             const int64_t row_end = starts[row - top];
             if (is_polygon_given_up(p, 16 * (row_end - begin) + box->right - box->left) || cross_too_often(p))
                 return;
-            resolve_row(p, scratch->pieces + begin, row_end - begin, box->left, box->right, scratch, scratch->shares);
+            resolve_row(p, polygon, scratch->pieces + begin, row_end - begin, box, scratch, scratch->shares);
             take(to, row, box->left, box->right, scratch->shares);
             begin = row_end;
         }

@@ -17,10 +17,10 @@ typedef struct {
     const int64_t *polygons;    /* (n_polygons + 1,): polygon i has the rings [polygons[i], polygons[i + 1]) */
     const uint8_t *is_wide;     /* (n_polygons,): some point is not narrow */
     const int8_t *weights;      /* (n_rings,): the factor of a ring's signed area, -1, 0 or 1; see `certify_polygons` */
+    const uint8_t *is_nonzero;  /* (n_polygons,): the rule, winding other than 0 instead of odd */
     const uint8_t *is_simple;   /* (n_polygons,): the weights are valid; otherwise pixels are resolved one by one */
     int64_t n_polygons;
     int bits;
-    int is_nonzero;                   /* the rule: winding other than 0 instead of odd */
     int32_t sample_x_fx, sample_y_fx; /* the sample from the pixel's centre */
     int64_t *crossings_left;          /* shared by all threads: how often rings may cross, see slabs.c */
     struct tl_pause *pause;           /* of this call, or NULL: the picture is drawn to its end */

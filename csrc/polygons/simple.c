@@ -500,13 +500,14 @@ static int wound_by(simple_search *s, const chain_node *a, int32_t ring, int64_t
     return winding;
 }
 
-TL_INLINE int rule_holds(const tl_polygons *p, int winding) { return p->is_nonzero ? winding != 0 : winding & 1; }
+TL_INLINE int rule_holds(int is_nonzero, int winding) { return is_nonzero ? winding != 0 : winding & 1; }
 
 /* Whether the rings of a polygon do not meet, by comparison; if so, sets their weights. */
 static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int8_t *weights, int64_t *room)
 {
     const int64_t r0 = p->polygons[polygon], n_rings = p->polygons[polygon + 1] - r0, base = p->rings[r0];
     const int64_t n_points = p->rings[r0 + n_rings] - base;
+    const int is_nonzero = p->is_nonzero[polygon];
     simple_search s = {p, base, r0, NULL, 0, is_wide, TL_COMPARED_NODES * n_points + (1 << 16)};
     if (n_rings == 0)
         return 1;
@@ -522,7 +523,7 @@ static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int
         const int winding = n_rings == 1 ? 0 : wound_by(&s, s.nodes + root, ring, first);
         const int turn = ring_turn(p, is_wide, first, p->rings[r0 + ring + 1]);
         /* y down, a positive area runs downwards on its right: inside the winding number is one less */
-        weights[r0 + ring] = (int8_t)(turn * (rule_holds(p, winding - turn) - rule_holds(p, winding)));
+        weights[r0 + ring] = (int8_t)(turn * (rule_holds(is_nonzero, winding - turn) - rule_holds(is_nonzero, winding)));
     }
     return s.n_left >= 0;
 }

@@ -51,7 +51,7 @@ typedef struct {
     double *crossings; /* a tree: the heights at which neighbours cross; each node is the least below it */
     int n_active, n_changes, n_events, n_edges, n_new;
     int32_t winding; /* left of the pixel, in the slab */
-    int is_given_up;
+    int is_nonzero, is_given_up;
     int64_t n_crossings;
     double pixel; /* a sub-pixel */
 } piece_row;
@@ -175,7 +175,7 @@ static void sort_slab(piece_row *w)
 
 static inline int is_winding_inside(const piece_row *w, int32_t winding)
 {
-    return w->p->is_nonzero ? winding != 0 : winding & 1;
+    return w->is_nonzero ? winding != 0 : winding & 1;
 }
 
 /* Sets the height at which the edges k and k + 1 cross in the slab, INFINITY if they do not. */

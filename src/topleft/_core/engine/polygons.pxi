@@ -52,16 +52,17 @@ cdef class SnappedPolygons:
     cdef int64_t crossings_left, max_crossings
 
     def __init__(self, int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None, const int64_t[::1] rings,
-                 const int64_t[::1] polygons, int64_t width, int64_t height, int bits, bint is_nonzero):
+                 const int64_t[::1] polygons, int64_t width, int64_t height, int bits, const uint8_t[::1] is_nonzero):
         self.n_polygons, self.n_rings = polygons.shape[0] - 1, rings.shape[0] - 1
         self.width, self.height = width, height
         self.is_wide, self.boxes = np.empty(self.n_polygons + 1, np.uint8), np.empty((self.n_polygons + 1, 4), np.int32)
-        self.arrays = (x_fx, y_fx, wide_fx, rings, polygons)
+        self.arrays = (x_fx, y_fx, wide_fx, rings, polygons, is_nonzero)
         memset(&self.set, 0, sizeof(self.set))
         self.set.x_fx, self.set.y_fx = &x_fx[0], &y_fx[0]
         self.set.wide_fx = &wide_fx[0, 0] if wide_fx is not None else NULL
         self.set.rings, self.set.polygons, self.set.n_polygons = &rings[0], &polygons[0], self.n_polygons
-        self.set.is_wide, self.set.bits, self.set.is_nonzero = &self.is_wide[0], bits, is_nonzero
+        self.set.is_wide, self.set.bits = &self.is_wide[0], bits
+        self.set.is_nonzero = &is_nonzero[0] if self.n_polygons else NULL
 
     cdef tl_polygon_box *box(self) noexcept:
         return <tl_polygon_box *>&self.boxes[0, 0]

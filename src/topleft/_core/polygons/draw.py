@@ -31,12 +31,7 @@ TESTS = {"center": 0, "outer": 1, "inner": 2}  # tl_polygon_test in csrc/polygon
 
 
 def draw_mask(
-    prepared: Prepared,
-    out: npt.NDArray[np.uint8],
-    *,
-    is_nonzero: bool,
-    polygon: int = 0,
-    rows: tuple[int, int] | None = None,
+    prepared: Prepared, out: npt.NDArray[np.uint8], *, polygon: int = 0, rows: tuple[int, int] | None = None
 ) -> None:
     """Write the mask of a polygon, or rows of it, over contiguous (H, W) bytes."""
     compiled, (width, height) = prepared.compiled, prepared.frame.size
@@ -44,7 +39,7 @@ def draw_mask(
     height = stop - begin
     stride = engine.polygon_stride(width)
     n_threads = prepared.n_threads
-    if is_nonzero:
+    if prepared.is_nonzero[polygon]:
         n_listed = max(prepared.most_edges, min(MAX_LISTED_CROSSINGS, prepared.most_edges * height)) + 1
 
         def draw_rows(top: int, bottom: int) -> None:

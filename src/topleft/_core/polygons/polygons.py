@@ -6,7 +6,7 @@ Input: rings and a size. Output: an array (H, W) or (H, W, C).
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -65,7 +65,8 @@ def polygons(
     size : (int, int) or Grid
         Width and height of the picture in pixels; or a grid: the points are then in its units.
     rule : "evenodd" or "nonzero"
-        A point is inside if the rings wind round it an odd number of times, or any number of times but 0.
+        A point is inside if the rings wind round it an odd number of times, or any number of times but 0. Where parts
+        of a MultiPolygon or of a GeometryCollection overlap, they are united under either rule.
     values : "index", number, or array_like (P,) or (P, C), optional
         The value of a pixel in a polygon: "index" the index of the polygon, as int32; a number for all polygons or for
         each, of any dtype; or a colour for each. Without `values` the result is a mask.
@@ -151,7 +152,7 @@ def polygons(
         if how in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER):
             with Canvas.of(FRESH, "mask", out, shape, np.bool_) as (mask, canvas):
                 if canvas.size:
-                    draw_binary(prepared, canvas.view(np.uint8), how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+                    draw_binary(prepared, canvas.view(np.uint8), how, assume_valid=assume_valid)
             return mask
         with Canvas.of(FRESH, "share", out, shape, np.float32) as (result, canvas):
             if not canvas.size:
@@ -160,7 +161,7 @@ def polygons(
                 prepared.certify(assume_valid=assume_valid)
                 add_shares(prepared, canvas, None)
             else:
-                mean_of_samples(prepared, canvas, None, how, is_nonzero=is_nonzero)
+                mean_of_samples(prepared, canvas, None, how)
         return result
     if background is None and isinstance(size, Grid) and not isinstance(values, str):
         background = size.nodata
@@ -169,7 +170,7 @@ def polygons(
     warn_if_apart(prepared, ring_set, size)
     with Canvas.of(FRESH, "values", out, (*shape, *paint.table.shape[1:]), paint.table.dtype.type) as (result, canvas):
         if canvas.size:
-            paint_values(prepared, canvas, paint, how, is_nonzero=is_nonzero, assume_valid=assume_valid)
+            paint_values(prepared, canvas, paint, how, assume_valid=assume_valid)
     return result
 
 
@@ -190,7 +191,7 @@ def in_crs_of(size: object, rings: Any, crs: object) -> RingSet:
         raise ValueError(
             f"rings must be of the CRS of the grid, {of_grid}, got {crs_of_rings}: crs={crs_of_rings!r} transforms them"
         )
-    return RingSet(transformed(ring_set.points, crs_of_points, of_grid), ring_set.rings, ring_set.polygons)
+    return replace(ring_set, points=transformed(ring_set.points, crs_of_points, of_grid))
 
 
 def frame_of(
@@ -204,7 +205,7 @@ def frame_of(
 ) -> tuple[RingSet, Frame]:
     """Return the rings in pixels, and the frame to draw."""
     if isinstance(size, Grid):
-        rings, size = RingSet(size.to_pixels(rings.points), rings.rings, rings.polygons), size.size
+        rings, size = replace(rings, points=size.to_pixels(rings.points)), size.size
     bits = as_subpixel_bits(subpixel_bits)
     grid_bits = max(1 if n_samples == 1 else SAMPLE_GRID_BITS, bits)
     corner = as_window(origin, grid_bits + 2)
@@ -236,21 +237,17 @@ def warn_if_apart(prepared: Prepared, rings: RingSet, size: object) -> None:
     )
 
 
-def draw_binary(
-    prepared: Prepared, mask: npt.NDArray[np.uint8], how: Sampling, *, is_nonzero: bool, assume_valid: bool
-) -> None:
+def draw_binary(prepared: Prepared, mask: npt.NDArray[np.uint8], how: Sampling, *, assume_valid: bool) -> None:
     """Write the mask of all polygons."""
     if how is not Sampling.CENTER:
         prepared.certify(assume_valid=assume_valid)
     elif len(prepared) == 1:
-        draw_mask(prepared, mask, is_nonzero=is_nonzero)
+        draw_mask(prepared, mask)
         return
     draw_labels(prepared, mask, np.ones(len(prepared) + 1, np.int32), 0, str(how))
 
 
-def mean_of_samples(
-    prepared: Prepared, out: npt.NDArray[np.float32], paint: Paint | None, how: Sampling, *, is_nonzero: bool
-) -> None:
+def mean_of_samples(prepared: Prepared, out: npt.NDArray[np.float32], paint: Paint | None, how: Sampling) -> None:
     """Write the mean over the samples of each pixel: of 0 or 1, or of colours."""
     height, width = out.shape[:2]
     positions = sample_positions(how.n_samples, prepared.frame.grid_bits).tolist()
@@ -261,7 +258,7 @@ def mean_of_samples(
     for at in positions:
         prepared.compiled.at_sample(*at)
         if mask is not None:
-            draw_binary(prepared, mask, Sampling.CENTER, is_nonzero=is_nonzero, assume_valid=False)
+            draw_binary(prepared, mask, Sampling.CENTER, assume_valid=False)
             np.add(out, mask, out=out)
         elif labels is not None and table is not None:
             draw_labels(prepared, labels, None, -1)
@@ -299,9 +296,7 @@ def as_paint(values: Any, background: Any, n: int, how: Sampling) -> Paint:
     return Paint(np.ascontiguousarray(table), row)
 
 
-def paint_values(
-    prepared: Prepared, out: npt.NDArray[Any], paint: Paint, how: Sampling, *, is_nonzero: bool, assume_valid: bool
-) -> None:
+def paint_values(prepared: Prepared, out: npt.NDArray[Any], paint: Paint, how: Sampling, *, assume_valid: bool) -> None:
     """Write the values of polygons over contiguous pixels."""
     if how in (Sampling.OUTER, Sampling.INNER, Sampling.AREA):
         prepared.certify(assume_valid=assume_valid)
@@ -312,7 +307,7 @@ def paint_values(
             colors = np.ascontiguousarray(paint.table.reshape(len(paint.table), -1), np.float32)
             add_shares(prepared, picture, colors if len(colors) else None)
         else:
-            mean_of_samples(prepared, picture, paint, how, is_nonzero=is_nonzero)
+            mean_of_samples(prepared, picture, paint, how)
         if picture is not out:
             out[...] = np.rint(picture) if out.dtype == np.uint8 else picture
         return

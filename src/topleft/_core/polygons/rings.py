@@ -29,6 +29,9 @@ class RingSet:
     points: npt.NDArray[Any]  # (N, 2), contiguous float32, float64 or int64
     rings: I64
     polygons: I64
+    unions: npt.NDArray[np.uint8] | None = None
+    """(P,) 1 for a polygon of parts that overlap: borders run one way and holes the other, and a point is inside where
+    the winding number is not 0. None: there is no such polygon."""
 
     __setstate__ = set_aligned
 
@@ -39,7 +42,8 @@ class RingSet:
         """Return polygons [first, end)."""
         rings = self.rings[self.polygons[first] : self.polygons[end] + 1]
         polygons = self.polygons[first : end + 1]
-        return RingSet(self.points[rings[0] : rings[-1]], rings - rings[0], polygons - polygons[0])
+        unions = None if self.unions is None else self.unions[first:end]
+        return RingSet(self.points[rings[0] : rings[-1]], rings - rings[0], polygons - polygons[0], unions)
 
     def apart_from(self, out: object) -> RingSet:
         """Return the polygons with copies of the arrays that `out` may share memory with."""
@@ -52,7 +56,7 @@ class RingSet:
         points, rings, polygons = (
             np.asarray(apart_from(out, "rings", each)) for each in (self.points, self.rings, self.polygons)
         )
-        return RingSet(points, rings, polygons)
+        return RingSet(points, rings, polygons, self.unions)
 
 
 def as_rings(values: Any) -> RingSet:
@@ -67,10 +71,48 @@ def as_rings(values: Any) -> RingSet:
     if rings is None:
         values = values.to_numpy() if hasattr(values, "to_numpy") else values
         if _is_geometry(values):
-            rings = _join([list(chain.from_iterable(_parts_of_geometry(one))) for one in _geometries(values)])
+            parts = [list(_parts_of_geometry(geometry)) for geometry in _geometries(values)]
+            rings = united(_join([*chain.from_iterable(parts)]), np.cumsum([0, *map(len, parts)]))
         else:
             rings = _join(_nested(values))
     return _checked(rings)
+
+
+def united(parts: RingSet, geometries: I64) -> RingSet:
+    """Return polygons of several parts each, those of polygon i `[geometries[i], geometries[i + 1])`.
+
+    Rings of parts with boxes that overlap are turned: the first one of a part, its border, one way, holes the other.
+    """
+    n_parts, starts = np.diff(geometries), parts.rings[parts.polygons]
+    joined = RingSet(parts.points, parts.rings, parts.polygons[geometries])
+    is_some = starts[:-1] < starts[1:]
+    owners = np.repeat(np.arange(len(n_parts)), n_parts)
+    which = np.flatnonzero(is_some & (n_parts > 1)[owners])
+    if not len(which):
+        return joined
+    low, high = (np.full((len(owners), 2), np.nan) for _ in range(2))
+    low[is_some], high[is_some] = (f.reduceat(parts.points, starts[:-1][is_some]) for f in (np.minimum, np.maximum))
+    unions, order = np.zeros(len(n_parts), np.uint8), which[np.lexsort((low[which, 0], owners[which]))]
+    for step in range(1, len(which)):
+        order = order[unions[owners[order]] == 0]
+        one, other = order[:-step], order[step:]
+        is_near = (owners[one] == owners[other]) & (low[other, 0] < high[one, 0])
+        one, other = one[is_near], other[is_near]
+        if not len(one):
+            break
+        is_met = (low[other, 1] < high[one, 1]) & (low[one, 1] < high[other, 1])
+        unions[owners[one[is_met]]] = 1
+    if not unions.any():
+        return joined
+    points = parts.points.copy()
+    for part in which[unions[owners[which]] == 1].tolist():
+        for ring in range(parts.polygons[part], parts.polygons[part + 1]):
+            own = points[parts.rings[ring] : parts.rings[ring + 1]]
+            x, y = (own[:, :2] - own[:1, :2].astype(np.float64)).T
+            is_positive = float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0
+            if is_positive != (ring == parts.polygons[part]):
+                own[:] = own[::-1].copy()
+    return RingSet(points, joined.rings, joined.polygons, unions)
 
 
 def rings_of_triangles(points: npt.NDArray[Any], triangles: npt.NDArray[np.int32]) -> RingSet:
@@ -168,8 +210,9 @@ def _from_ragged(coordinates: npt.NDArray[Any], offsets: Sequence[Any]) -> RingS
     rings = _as_offsets(offsets[0], "ring_offsets", len(points), "coordinates")
     parts = _as_offsets(offsets[1], "polygon_offsets", len(rings) - 1, "rings")
     if len(offsets) == 3:
-        parts = parts[_as_offsets(offsets[2], "geometry_offsets", len(parts) - 1, "polygons")]
-    return RingSet(points, rings, np.ascontiguousarray(parts))
+        geometries = _as_offsets(offsets[2], "geometry_offsets", len(parts) - 1, "polygons")
+        return united(RingSet(points, rings, parts), geometries)
+    return RingSet(points, rings, parts)
 
 
 def _from_shapely(values: Any) -> RingSet | None:

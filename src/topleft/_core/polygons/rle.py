@@ -132,7 +132,7 @@ def encode_polygons(
         right, bottom = (max(box[k] for box in shown) for k in (2, 3))
         key = first if owners is None else int(owners[first])
         if end - first == 1:
-            draw_mask(prepared, mask, is_nonzero=is_nonzero, polygon=first, rows=(top, bottom))
+            draw_mask(prepared, mask, polygon=first, rows=(top, bottom))
             table.add(mask[None], box=(left, top, right, bottom), key=key)
         else:  # parts may be thousands: the rectangles of a crowd
             window: dict[str, Any] = {"origin": (left, top), "subpixel_bits": frame.subpixel_bits, "threads": 1}

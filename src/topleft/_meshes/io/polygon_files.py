@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from topleft._core.base.georeference import WGS84
 from topleft._core.base.notes import Notes, tell
-from topleft._core.polygons.rings import LOWER_KINDS, RingSet
+from topleft._core.polygons.rings import LOWER_KINDS, RingSet, united
 from topleft._core.raster.rle import read_counts
 from topleft._meshes.io.limits.archives import is_junk
 from topleft.errors import MeshError, MissingPackageError
@@ -72,16 +72,22 @@ class PolygonPicture:
 
     @property
     def polygons(self) -> RingSet:
-        """The parts of all objects, a polygon each."""
+        """Polygons with the `owners`: a part each of annotations of COCO, all parts of an object on a plane."""
         points = np.concatenate([np.empty((0, 2)), *(part.points for part in self.parts)])
         lengths = np.concatenate([np.zeros(1, np.int64), *(part.lengths for part in self.parts)])
         counts = np.concatenate([np.zeros(1, np.int64), *(part.counts for part in self.parts)])
-        return RingSet(points, np.cumsum(lengths), np.cumsum(counts))
+        found = RingSet(points, np.cumsum(lengths), np.cumsum(counts))
+        return found if self.size is not None else united(found, np.cumsum([0, *map(len, self._counts)]))
 
     @property
     def owners(self) -> npt.NDArray[np.int64]:
         """The object that each polygon is of."""
-        return np.repeat(np.arange(len(self.parts)), [len(part.counts) for part in self.parts])
+        n = [1 if self.size is None else len(counts) for counts in self._counts]
+        return np.repeat(np.arange(len(self.parts)), n)
+
+    @property
+    def _counts(self) -> list[npt.NDArray[np.int64]]:
+        return [part.counts for part in self.parts]
 
 
 VECTOR_SUFFIXES = (".fgb", ".gml", ".gpkg", ".kml", ".parquet", ".shp", ".sqlite", ".zip")

@@ -7,6 +7,7 @@ in the place of triangles; each window is the crop of the picture that `polygons
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,8 @@ class Areas:
     def parts(self) -> Iterator[Array]:
         """All that they consist of, in pieces, to be hashed."""
         yield from (self.rings.points, self.rings.rings, self.rings.polygons)
+        if self.rings.unions is not None:
+            yield self.rings.unions
 
     def boxes(self) -> npt.NDArray[np.float64]:
         """The box (N, 4) of each: least x and y, largest x and y; of none without points."""
@@ -72,7 +75,8 @@ class Areas:
         ring_rows, n_rings = _ranges(polygon_offsets[which], polygon_offsets[which + 1])
         point_rows, n_points = _ranges(rings[ring_rows], rings[ring_rows + 1])
         ring_offsets, offsets = (np.concatenate([[0], np.cumsum(n)]).astype(np.int64) for n in (n_points, n_rings))
-        return RingSet(self.rings.points[point_rows], ring_offsets, offsets)
+        unions = None if self.rings.unions is None else self.rings.unions[which]
+        return RingSet(self.rings.points[point_rows], ring_offsets, offsets, unions)
 
 
 def _ranges(
@@ -87,7 +91,7 @@ def _ranges(
 def areas_of(subject: Any, grid: Grid | None, crs: object) -> Areas:
     """Polygons in the pixels of a grid, or as they are."""
     rings = in_crs_of(grid, subject, crs)
-    return Areas(rings if grid is None else RingSet(grid.to_pixels(rings.points), rings.rings, rings.polygons))
+    return Areas(rings if grid is None else replace(rings, points=grid.to_pixels(rings.points)))
 
 
 def extent_of_polygons(subject: Any) -> Extent:
