@@ -523,7 +523,8 @@ static int compare_rings(const tl_polygons *p, int is_wide, int64_t polygon, int
         const int winding = n_rings == 1 ? 0 : wound_by(&s, s.nodes + root, ring, first);
         const int turn = ring_turn(p, is_wide, first, p->rings[r0 + ring + 1]);
         /* y down, a positive area runs downwards on its right: inside the winding number is one less */
-        weights[r0 + ring] = (int8_t)(turn * (rule_holds(is_nonzero, winding - turn) - rule_holds(is_nonzero, winding)));
+        const int is_inside = rule_holds(is_nonzero, winding - turn);
+        weights[r0 + ring] = (int8_t)(turn * (is_inside - rule_holds(is_nonzero, winding)));
     }
     return s.n_left >= 0;
 }

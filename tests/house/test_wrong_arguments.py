@@ -69,6 +69,7 @@ CALLS = {
     "Camera.from_pytorch3d": (tl.Camera.from_pytorch3d, {"cameras": PYTORCH3D, "i": 0, "size": SIZE,
                                                          "pixel_center": 0.5, "near": 1, "far": 2}),
     "Camera.project": (CAMERA.project, {"points": [[0, 0, 0]], "size": SIZE}),
+    "Camera.distance_of": (CAMERA.distance_of, {"depth": [[0.5]]}),
     "Camera.clip_from_world": (CAMERA.clip_from_world, {"size": SIZE}),
     "FisheyeLens": (tl.FisheyeLens, {"k1": 0.1}),
     "Fog": (tl.Fog, {"near": 1, "far": 2, "color": (0, 0, 0)}),

@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     try:
         with warnings.catch_warnings(), listening() as lacks, hearing_sigterm():
-            warnings.showwarning = tell_of_ours
+            warnings.showwarning = tell_of_ours  # type: ignore[assignment]
             status: int = options.run(options)
         complain_of_lacks(lacks)
     except TOLD as error:

@@ -68,7 +68,9 @@ class MeshSource:
         if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
             raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
         limits = dict(self.limits)
-        return load(self.name, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, **limits)
+        return load(
+            self.name, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, root=None, **limits
+        )
 
 
 def read_texture(path: str) -> Texture:

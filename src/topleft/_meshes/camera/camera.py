@@ -204,10 +204,21 @@ class Camera:
             return {}
         return {"clip_depth": "zero_to_one", "near_clip": not self.projection[3, 2], "far_clip": False}
 
-    def distance_of(self, depth: npt.NDArray[Any]) -> F64:
-        """Distance along the view, world units, of depths in a picture."""
+    def distance_of(self, depth: npt.ArrayLike) -> F64:
+        """Distances along the view, float64, of depths in a picture of this camera.
+
+        Parameters
+        ----------
+        depth : array_like of any shape
+            As `Fragments.depth` has it; depths of pixels that show nothing have no meaning here.
+
+        Returns
+        -------
+        ndarray of that shape, world units
+        """
         (a, b), (c, d) = self.drawn_from_eye((1, 1))[2:, 2:]
-        ndc = 2.0 * depth.astype(np.float64) - 1 if self.has_planes else depth.astype(np.float64)
+        ndc = as_real("depth", depth)
+        ndc = 2.0 * ndc - 1 if self.has_planes else ndc
         return (ndc * d - b) / (ndc * c - a)
 
     def straightened(self) -> Camera:

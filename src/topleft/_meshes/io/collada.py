@@ -123,8 +123,12 @@ class _Collada:
             self._notes.add("geometries that are not there", instance.get("url", ""))
             return
         first = geometry.find(".//input[@semantic='TEXCOORD']")
-        for row in instance.iter("bind_vertex_input") if first is not None else ():
-            if row.get("semantic") in self._sets and row.get("input_set", "0") != first.get("set", "0"):
+        for row in instance.iter("bind_vertex_input"):
+            if (
+                first is not None
+                and row.get("semantic") in self._sets
+                and row.get("input_set", "0") != first.get("set", "0")
+            ):
                 self._notes.add("textures laid by the first of several texture coordinates", row.get("semantic", ""))
         targets = {row.get("symbol"): row.get("target") for row in instance.iter("instance_material")}
         budget = self._source.budget

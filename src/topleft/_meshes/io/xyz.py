@@ -31,7 +31,7 @@ def read_xyz(source: InputFile) -> list[Mesh]:
     at, n = 3, rows.shape[1]
     while at + 3 <= n:
         part = rows[:, at : at + 3]
-        if normals is None and (np.abs(np.linalg.norm(part, axis=1) - 1) <= UNIT_ERROR).all():
+        if normals is None and (np.abs(np.sqrt((part * part).sum(axis=1)) - 1) <= UNIT_ERROR).all():
             normals = part
         elif colors is None and _are_bytes(part):
             has_opacity = n == at + 4 and _are_bytes(rows[:, at + 3 :])

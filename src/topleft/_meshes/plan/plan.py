@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -353,7 +353,7 @@ def plan_mesh(
         raise ValueError("transform is that of the camera: give either")
     viewport = options.get("viewport")
     options["transform"] = camera.drawn_from_world(viewport or size)
-    options.update(camera.depth_options)
+    options.update(cast(ViewOptions, camera.depth_options))
     detail = choose_detail(
         mesh, camera, size, tolerance=tolerance, cull=options.get("cull"), viewport=viewport,
         origin=options.get("origin", (0, 0)),
