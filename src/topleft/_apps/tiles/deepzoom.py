@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -117,7 +118,7 @@ def fill_blanks(raster: WindowedRaster, store: DeepZoomStore, ground: U8) -> Non
 def painting(raster: WindowedRaster) -> Callable[[Array], U8]:
     """Return the function that makes colours of the pixels of a kind."""
     if raster.kind == "labels":
-        return lambda labels: label_colors(labels, raster.painter.empty)
+        return partial(label_colors, empty=raster.painter.empty)
     if raster.dtype == bool:
         return lambda mask: mask.view(np.uint8) * np.uint8(255)
     if raster.kind == "coverage":
@@ -126,7 +127,7 @@ def painting(raster: WindowedRaster) -> Callable[[Array], U8]:
         return lambda counts: np.rint(np.minimum(counts, 255)).astype(np.uint8)
     if raster.kind in ("depth", "field", "height_map"):
         low, high = raster.range_of_values
-        return lambda values: greys(values, raster.painter.empty, low, high)
+        return partial(greys, empty=raster.painter.empty, low=low, high=high)
     if raster.dtype == np.uint8 and raster.shape[2:] in ((), (2,), (3,), (4,)):
         return lambda pixels: pixels
     raise ValueError(f"colors must say how {raster.dtype} of kind {raster.kind!r} becomes uint8")

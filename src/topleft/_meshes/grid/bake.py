@@ -378,7 +378,7 @@ def depth_of(frags: Fragments, camera: Camera) -> tuple[F64, F32]:
     height, width = frags.depth.shape
     clip, depth = camera.drawn_from_world((width, height)), frags.depth
     if not camera.has_planes:
-        largest = float(np.abs(depth[frags.mask]).max(initial=1e-300))
+        largest = max(float(np.abs(depth[frags.mask]).max(initial=0.0)), 1e-30)
         clip[2], depth = clip[2] * (2 / largest) - clip[3], depth / np.float32(largest)  # depth is (z / w + 1) / 2
     return clip, depth
 
