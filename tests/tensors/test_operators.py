@@ -579,7 +579,7 @@ def test_words_of_render_are_read_from_memory_that_no_other_thread_can_write():
     words = pictures.pack(pictures.picture()[1])
     seen = pictures.unpack(words)
     words[:] = -1
-    assert all((one.faces >= 0).all() for one in seen)
+    assert all((one.faces[:, : one.counts[2]] >= 0).all() for one in seen)  # room behind them has any values
 
 
 @pytest.mark.parametrize("change", [torch.Tensor.half, lambda one: one[:, :2], lambda one: one[:0]])
