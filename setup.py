@@ -9,7 +9,6 @@ flags, so `BuildTopleft` compiles each unit by itself and links the objects.
 Environment:
 
 TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them; an error when it cannot be
-TOPLEFT_NO_INT128   "1" builds without the compiler's 128-bit integers, as it is done where there are none
 TOPLEFT_WERROR      "1" turns warnings into errors
 TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
 TOPLEFT_URL         the address of the repository, for links and pictures in the metadata; the release workflow knows it
@@ -273,8 +272,7 @@ class BuildTopleft(build_ext):
         What takes longest stands first, so that no core waits for it at the end.
         """
         isas = self.isas_to_build(pool)
-        own = ["-DTL_NO_INT128"] if os.environ.get("TOPLEFT_NO_INT128") == "1" else []
-        flags = {isa.name: FLAGS_C + isa.flags + own for isa in isas}
+        flags = {isa.name: FLAGS_C + isa.flags for isa in isas}
         macros = [("TL_VERSION", quoted(self.distribution.get_version()))]
         for name, unit_flags in flags.items():
             # Paths say where a machine keeps things, not how the code was compiled.

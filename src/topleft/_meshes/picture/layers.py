@@ -147,7 +147,7 @@ class Layers(ABC):
         return self.frags.mask if sampling == "center" else self.share(sampling)
 
     def depth(self) -> Array:
-        """Window depth (H, W) float32, +inf where nothing is."""
+        """Depth (H, W) float32 as `rasterize_mesh` has it, +inf where nothing is."""
         return self.frags.depth
 
     def distance(self) -> Array:
