@@ -160,6 +160,45 @@ def test_nerfstudio_frames_have_intrinsics_of_their_own():
     assert_at(Camera.from_nerfstudio({"fl_x": 500, "frames": frames}), nerfstudio_pixels(C2W, 400, 400, 320, 200))
 
 
+FISHEYE = LENSES["OPENCV_FISHEYE"]
+
+
+@pytest.mark.parametrize("lens", [FISHEYE, {"k1": -0.1}, {"p1": 0.0, "p2": 0.0, **FISHEYE}, {}], ids=repr)
+def test_nerfstudio_reads_is_fisheye_of_instant_ngp(lens):
+    frame = {"transform_matrix": C2W.tolist()}
+    content = {"fl_x": 500.0, "w": 640.0, "h": 400.0, "is_fisheye": True, **lens, "frames": [frame]}
+    assert_at(Camera.from_nerfstudio(content), nerfstudio_pixels(C2W, 500, 500, 320, 200, **lens, is_fisheye=True))
+    of_frame = content | {"is_fisheye": False, "frames": [frame | {"is_fisheye": True}]}
+    assert Camera.from_nerfstudio(of_frame).lens == Camera.from_nerfstudio(content).lens
+    named = content | {"camera_model": "OPENCV_FISHEYE"}
+    assert Camera.from_nerfstudio(named).lens == Camera.from_nerfstudio(content).lens
+
+
+def test_nerfstudio_takes_false_for_other_lenses_as_none():
+    names = "is_fisheye", "latlong", "equirectangular", "orthographic"
+    content = {"fl_x": 500, "w": 640, "h": 400, **dict.fromkeys(names, False), "frames": [FRAME]}
+    assert Camera.from_nerfstudio(content).lens is None
+
+
+@pytest.mark.parametrize("kind", [float, np.float32, np.float64])
+def test_sizes_of_files_may_be_whole_floats(kind):
+    content = {"fl_x": 500, "w": kind(1080.0), "h": kind(1920.0), "frames": [FRAME]}
+    assert repr(Camera.from_nerfstudio(content)) == repr(Camera.from_nerfstudio(content | {"w": 1080, "h": 1920}))
+    colmap = {"model": "PINHOLE", "width": 640, "height": 400, "params": COLMAP["PINHOLE"]}
+    floats = colmap | {"width": kind(640), "height": kind(400)}
+    assert repr(Camera.from_colmap(floats, PLACE)) == repr(Camera.from_colmap(colmap, PLACE))
+
+
+def test_load_cameras_points_to_readers_of_nerfstudio_and_colmap(tmp_path):
+    (tmp_path / "transforms.json").write_text("{}")
+    (tmp_path / "images.bin").write_bytes(b"")
+    for path in (tmp_path, tmp_path / "transforms.json", tmp_path / "images.bin"):
+        with pytest.raises(tl.MeshError, match=r"from_nerfstudio reads .* Camera\.from_colmap an image"):
+            tl.load_cameras(path)
+    with pytest.raises(FileNotFoundError):
+        tl.load_cameras(tmp_path / "none.json")
+
+
 def test_blender_scenes_of_nerf_have_an_angle_and_no_size():
     content = {"camera_angle_x": 0.7, "frames": [{"transform_matrix": C2W.tolist()}]}
     focal = 0.5 * 640 / np.tan(0.5 * 0.7)
@@ -268,6 +307,7 @@ def test_a_rotation_vector_is_the_exponential_of_its_matrix(vector):
 
 LINE, PLACE = "1 PINHOLE 640 400 500 500 320 200", "1 1 0 0 0 0 0 4 1 a.jpg"
 FRAME = {"transform_matrix": np.eye(4).tolist()}
+FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
 
 
 @pytest.mark.parametrize(
@@ -295,6 +335,20 @@ FRAME = {"transform_matrix": np.eye(4).tolist()}
             ValueError,
             "camera_model must be one of SIMPLE_PINHOLE, .*, got 'ORTHOPHOTO'",
         ),
+        *(
+            (
+                lambda key=key, value=value: Camera.from_nerfstudio(FILE | {key: value}),
+                ValueError,
+                f"transforms must be of perspective or is_fisheye cameras, got {key}",
+            )
+            for key, value in [("latlong", True), ("equirectangular", True), ("orthographic", 1), ("ftheta_p0", 0.0)]
+        ),
+        (
+            lambda: Camera.from_nerfstudio(FILE | {"camera_model": "OPENCV", "is_fisheye": True}),
+            ValueError,
+            "is_fisheye must be false where camera_model is OPENCV, got True",
+        ),
+        (lambda: Camera.from_nerfstudio(FILE | {"w": 4.5}), TypeError, r"size \(w and h of the file\) .*4.5"),
         (
             lambda: Camera.from_nerfstudio({"fl_x": 5, "w": 4, "h": 4, "k4": 0.1, "frames": [FRAME]}),
             ValueError,

@@ -50,6 +50,9 @@ NERFSTUDIO_MODELS: Mapping[str, str] = {
     "OPENCV_FISHEYE": "fisheye",
 }
 
+#: Keys of Instant NGP's transforms.json for lenses that `Camera` does not have.
+OTHER_LENSES = "ftheta_p0", "latlong", "equirectangular", "orthographic"
+
 
 class Calibration(NamedTuple):
     """The arguments of `Camera.from_intrinsics`."""
@@ -74,11 +77,12 @@ def of_colmap(camera: Any, image: Any) -> Calibration:
     n_focal, kind, n_terms = COLMAP_MODELS[model]
     if params.shape != (n_focal + 2 + n_terms,):
         raise ValueError(f"params of {model} must be {n_focal + 2 + n_terms} numbers, got {params.size}")
+    size = as_size((as_whole(width), as_whole(height)), smallest=1)
     fx, fy = params[0], params[n_focal - 1]
     cx, cy, *terms = params[n_focal:].tolist()
     terms += [0.0] * ((4 if kind == "fisheye" or n_terms < 5 else 8) - n_terms)
     lens = {kind: terms} if kind else {}
-    return Calibration(matrix_of(fx, fy, cx, cy), pose, as_size((width, height), smallest=1), **lens)
+    return Calibration(matrix_of(fx, fy, cx, cy), pose, size, **lens)
 
 
 def colmap_camera(camera: Any) -> tuple[int | None, str, int, int, F64]:
@@ -135,10 +139,16 @@ def of_nerfstudio(transforms: Any, i: int, size: object) -> Calibration:
     known = {**content, **frame}
     if "transform_matrix" not in known:
         raise ValueError(f"frame {i} must have a transform_matrix, got {', '.join(frame) or 'nothing'}")
-    model = known.get("camera_model", "OPENCV")
+    for key in OTHER_LENSES:
+        if known.get(key) is not None and known[key] is not False:  # a p0 of 0.0 is a lens, too
+            raise ValueError(f"transforms must be of perspective or is_fisheye cameras, got {key}")
+    is_fisheye = bool(known.get("is_fisheye"))
+    model = known.get("camera_model", "OPENCV_FISHEYE" if is_fisheye else "OPENCV")
     if model not in NERFSTUDIO_MODELS:
         raise ValueError(f"camera_model must be one of {', '.join(NERFSTUDIO_MODELS)}, got {model!r}")
-    given = (known.get("w"), known.get("h")) if size is None else size
+    if is_fisheye and NERFSTUDIO_MODELS[model] != "fisheye":
+        raise ValueError(f"is_fisheye must be false where camera_model is {model}, got {known['is_fisheye']!r}")
+    given = (as_whole(known.get("w")), as_whole(known.get("h"))) if size is None else size
     width, height = as_size(given, "size (w and h of the file)", smallest=1)
     if "fl_x" in known:
         fx = as_number("fl_x", known["fl_x"])
@@ -236,6 +246,11 @@ def element(name: str, values: Any, i: int) -> Any:
     if not isinstance(i, int | np.integer) or not 0 <= i < len(values):
         raise IndexError(f"{name} must be an index from 0 to {len(values) - 1}, got {shown(i)}")
     return values[i]
+
+
+def as_whole(value: Any) -> Any:
+    """The integer of a float that is whole, as files have sides of pictures; other values as they are."""
+    return int(value) if isinstance(value, float | np.floating) and float(value).is_integer() else value
 
 
 def matrix_of(fx: float, fy: float, cx: float, cy: float) -> F64:

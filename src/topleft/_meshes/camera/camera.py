@@ -606,13 +606,15 @@ class Camera:
         Returns
         -------
         Camera
-            In the world of the file: turns, moves and scales by a data parser of nerfstudio are not applied.
+            In the world of the file: turns, moves and scales by a data parser of nerfstudio are not applied. It has
+            OpenCV's fisheye lens where `camera_model` is OPENCV_FISHEYE or `is_fisheye` is true.
 
         Raises
         ------
         ValueError
             If the file is broken or has no frames, focal length or size, or another camera model than OPENCV,
-            OPENCV_FISHEYE and the simpler ones; as `from_intrinsics`.
+            OPENCV_FISHEYE and the simpler ones, or `ftheta_p0`, `latlong`, `equirectangular` or `orthographic` of
+            Instant NGP; as `from_intrinsics`.
         FileNotFoundError
             If there is no such file.
         IndexError

@@ -51,7 +51,8 @@ def load_cameras(
     FileNotFoundError
         If there is no such file.
     MeshError
-        If the file is broken, or a camera of it has numbers that none can have, or there is no such animation.
+        If the file is broken, or a camera of it has numbers that none can have, or there is no such animation, or it
+        is a folder, JSON or text: `Camera.from_nerfstudio` and `Camera.from_colmap` are for those.
     ValueError
         If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
 
@@ -68,6 +69,11 @@ def load_cameras(
     """
     factor = as_scale(scale)
     source = InputFile(as_path("path", path), Budget(os.fspath(path)))
+    if source.path.is_dir() or (source.path.is_file() and source.path.suffix.lower() in (".json", ".txt", ".bin")):
+        raise MeshError(
+            f"{str(path)!r} is no mesh with cameras: Camera.from_nerfstudio reads a frame of a transforms.json, "
+            "Camera.from_colmap an image of COLMAP"
+        )
     source.moment = as_moment(time, clip)
 
     def cameras() -> list[Camera]:
