@@ -248,6 +248,16 @@ def test_gradients_of_gradients_are_refused():
         g.sum().backward()
 
 
+def test_hessians_of_a_loss_are_refused():
+    pos, tri, colours = sphere(level=1)
+
+    def loss(attr):
+        return dr.photometric_loss(CTX, pos, tri, attr, torch.zeros(len(pos), 4, 4, attr.shape[-1]))
+
+    with pytest.raises(NotImplementedError, match="gradients of its gradients are not computed"):
+        torch.autograd.functional.hessian(loss, colours)
+
+
 def test_torch_func_and_tangents_are_refused_by_name():
     pos, tri, colours = sphere(level=1)
 

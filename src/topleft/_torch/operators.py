@@ -147,6 +147,8 @@ def operator_of(operation: Operation) -> Any:
         if n:
             found[-1], given = [None] * n, [*given[:-n], given[-n:]]
         if operation.vjp is tensors.times:  # an operator would take longer
+            if torch.is_grad_enabled():  # of create_graph=True: the factors would count as constants
+                once()
             for i, own in zip(with_gradient, given, strict=True):
                 found[i] = g[0] * own
         elif any(one is not None for one in g[: operation.n_out]):
