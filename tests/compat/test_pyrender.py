@@ -113,9 +113,33 @@ def test_flat_pictures_show_the_base_color_as_it_is():
     assert (color == [51, 102, 255]).all()
 
 
-@pytest.mark.parametrize(("given", "unit"), [([0, 1, 1], 1), ([0, 1, 2], 255), ([0.0, 1.0, 2.0], 1)])
-def test_integers_of_a_color_are_bytes_where_one_is_above_1(given, unit):
-    assert_same(pr.DirectionalLight(color=given).color, np.array(given) / unit)
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ([0, 1, 1], [0, 1 / 255, 1 / 255]),
+        ((255, 128, 0), [1, 128 / 255, 0]),
+        (np.array([[3, 2, 1]], np.uint8), [3 / 255, 2 / 255, 1 / 255]),
+        ([0.0, 1.0, 2.0], [0, 1, 2]),
+        (255, [1, 1, 1]),
+        (0.25, [0.25, 0.25, 0.25]),
+        ([0.5, 0.25], [0.5, 0.25, 1]),
+        ([10, 20, 30, 40], [10 / 255, 20 / 255, 30 / 255]),
+    ],
+)
+def test_colors_are_read_as_pyrender_reads_them(given, expected):
+    """`format_color_vector` of pyrender: integers over 255, one number for all, 1 for those that are missing."""
+    expected = np.array(expected, float)
+    assert_same(pr.DirectionalLight(color=given).color, expected)
+    material = pr.MetallicRoughnessMaterial(baseColorFactor=given, emissiveFactor=given)
+    assert_same(material.emissiveFactor, expected)
+    assert_same(pr.Scene(bg_color=given, ambient_light=given).ambient_light, expected)
+    assert_same(material.baseColorFactor[:3], expected)
+
+
+@pytest.mark.parametrize("given", [[], np.zeros((2, 3)), np.zeros((2, 2, 3))])
+def test_what_is_no_color_is_refused(given):
+    with pytest.raises(ValueError, match=r"color must have shape \(3,\)"):
+        pr.DirectionalLight(color=given)
 
 
 @pytest.mark.parametrize("intensity", [0.5, 2.0])
@@ -210,7 +234,7 @@ def test_poses_of_nodes_are_products_along_the_tree():
 
 def test_sampled_outlines_are_mixed_in_the_numbers_of_the_picture():
     half = pr.Primitive([[-9, -9, 0], [0.01, -9, 0], [0.01, 9, 0], [-9, 9, 0]], indices=QUAD)
-    half.material = pr.MetallicRoughnessMaterial(baseColorFactor=[1, 1, 1, 1])
+    half.material = pr.MetallicRoughnessMaterial(baseColorFactor=[1.0, 1.0, 1.0, 1.0])
     color, _ = draw(scene_of(half, bg_color=[0, 0, 0, 1]), pr.RenderFlags.FLAT)
     assert set(np.unique(color)) <= {0, 64, 128, 191, 255}
     assert len(np.unique(color)) == 3

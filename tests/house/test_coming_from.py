@@ -83,6 +83,23 @@ def test_opencv_fills_the_border_too(names):
     assert theirs.sum() > ours.sum()
 
 
+@pytest.mark.parametrize("row", [row for row in rows(SECTIONS["OpenCV"]) if "cv2.fill" in row[0] and "255" in row[0]])
+def test_fills_of_opencv_have_the_dtype_and_the_range_here(row, names):
+    cv2 = pytest.importorskip("cv2")
+    ring = np.int32([[3, 2], [30, 5], [50, 8], [55, 30], [40, 41]])
+    mask = np.zeros((48, 64), np.uint8)
+    there, here, what = row
+    exec(there.strip("`"), names | {"cv2": cv2, "mask": mask, "ring": ring})
+    ours = eval(here.strip("`"), names | {"ring": ring})
+    if "LINE_AA" in there:
+        assert "float32 of 0 to 1" in what
+        assert ours.dtype == np.float32
+        ours = np.where(ours == 1, np.uint8(255), np.uint8(0))
+    assert (ours.dtype, np.unique(ours).tolist()) == (mask.dtype, [0, 255])
+    assert mask[ours > 0].all()
+    assert (mask > 0).sum() < (ours > 0).sum() + 300
+
+
 def test_skimage_has_rows_first_and_centres_on_whole_numbers(names):
     draw = pytest.importorskip("skimage.draw")
     ring = names["ring"]

@@ -40,7 +40,7 @@ class Light:
     ----------
     at : (3,) of float
         The direction *to* the light, of any length, or the point where it is. World space, or that of the eye (x right,
-        y up, the view along -z).
+        y up, the view along -z, of cameras of OpenCV, too).
     kind : {"directional", "point", "spot"}
         The meaning of `at`. A spot is a point whose light stays within a cone.
     color : (3,) of 0 to 255

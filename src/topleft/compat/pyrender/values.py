@@ -97,14 +97,13 @@ def as_vector(name: str, value: Any, n: int) -> F64:
 
 
 def as_rgb(name: str, value: Any, n: int) -> F64:
-    """A colour of n floats, 0 to 1: integers mean 0 to 255, and a missing opacity is 1."""
-    array = np.asarray([] if value is None else value)
-    scale = 255.0 if array.dtype.kind in "iu" and array.size and array.max() > 1 else 1.0
-    array = array.astype(np.float64) / scale
-    if array.ndim == 1 and n == 4 and len(array) == 3:
-        array = np.append(array, 1.0)
-    if array.ndim == 1 and n == 3 and len(array) == 4:
-        array = array[:3]
+    """A colour of n floats, as pyrender reads it: integers are divided by 255, missing numbers are 1."""
+    array = np.squeeze(np.asarray([] if value is None else value))
+    array = array.astype(np.float64) / (255.0 if array.dtype.kind in "iu" else 1.0)
+    if array.ndim == 0:
+        array = np.repeat(array, n)
+    elif array.ndim == 1 and len(array):
+        array = np.append(array, np.ones(n))[:n]
     return as_vector(name, array, n)
 
 
