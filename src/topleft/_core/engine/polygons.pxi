@@ -44,7 +44,7 @@ cdef class SnappedPolygons:
     """Snapped polygons in a window: their rings, boxes and weights, and the kernels that draw them."""
 
     cdef tl_polygons set
-    cdef uint8_t[::1] is_wide, is_simple
+    cdef uint8_t[::1] flags, is_simple
     cdef int8_t[::1] weights
     cdef int32_t[:, ::1] boxes
     cdef object arrays
@@ -52,17 +52,25 @@ cdef class SnappedPolygons:
     cdef int64_t crossings_left, max_crossings
 
     def __init__(self, int32_t[::1] x_fx, int32_t[::1] y_fx, int64_t[:, ::1] wide_fx or None, const int64_t[::1] rings,
-                 const int64_t[::1] polygons, int64_t width, int64_t height, int bits, const uint8_t[::1] is_nonzero):
+                 const int64_t[::1] polygons, int64_t width, int64_t height, int bits, bint is_nonzero,
+                 const uint8_t[::1] unions or None):
+        """Take snapped points (x, y), offsets, and the rule: "nonzero" for all or for the polygons that are 1 in `unions`."""
+        cdef int64_t i
+        cdef uint8_t *rules
         self.n_polygons, self.n_rings = polygons.shape[0] - 1, rings.shape[0] - 1
         self.width, self.height = width, height
-        self.is_wide, self.boxes = np.empty(self.n_polygons + 1, np.uint8), np.empty((self.n_polygons + 1, 4), np.int32)
-        self.arrays = (x_fx, y_fx, wide_fx, rings, polygons, is_nonzero)
+        self.flags = np.empty(2 * (self.n_polygons + 1), np.uint8)  # of each polygon, is_wide; then is_nonzero
+        self.boxes = np.empty((self.n_polygons + 1, 4), np.int32)
+        self.arrays = (x_fx, y_fx, wide_fx, rings, polygons)
         memset(&self.set, 0, sizeof(self.set))
         self.set.x_fx, self.set.y_fx = &x_fx[0], &y_fx[0]
         self.set.wide_fx = &wide_fx[0, 0] if wide_fx is not None else NULL
         self.set.rings, self.set.polygons, self.set.n_polygons = &rings[0], &polygons[0], self.n_polygons
-        self.set.is_wide, self.set.bits = &self.is_wide[0], bits
-        self.set.is_nonzero = &is_nonzero[0] if self.n_polygons else NULL
+        rules = &self.flags[self.n_polygons + 1]
+        memset(rules, is_nonzero, self.n_polygons)
+        for i in range(self.n_polygons if unions is not None else 0):
+            rules[i] |= unions[i]
+        self.set.is_wide, self.set.is_nonzero, self.set.bits = &self.flags[0], rules, bits
 
     cdef tl_polygon_box *box(self) noexcept:
         return <tl_polygon_box *>&self.boxes[0, 0]
@@ -71,6 +79,10 @@ cdef class SnappedPolygons:
     def boxes_px(self) -> I32:
         """The boxes of the polygons in pixels: left, top, right, bottom (P, 4), clipped to the window."""
         return np.asarray(self.boxes)[: self.n_polygons]
+
+    def is_nonzero(self, int64_t i) -> bool:
+        """Return whether the rule of a polygon is "nonzero"."""
+        return self.set.is_nonzero[i] != 0
 
     cdef tl_polygons asking(self) noexcept:
         """Return `tl_polygons`, with the pause of this thread."""
@@ -83,7 +95,7 @@ cdef class SnappedPolygons:
         cdef tl_polygon_box *boxes = self.box()
         cdef int64_t most
         with nogil:
-            most = K.bound_polygons(&self.set, first, end, self.width, self.height, &self.is_wide[0], boxes)
+            most = K.bound_polygons(&self.set, first, end, self.width, self.height, &self.flags[0], boxes)
         return most
 
     def make_weights(self, int64_t max_crossings):

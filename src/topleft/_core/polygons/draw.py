@@ -39,7 +39,7 @@ def draw_mask(
     height = stop - begin
     stride = engine.polygon_stride(width)
     n_threads = prepared.n_threads
-    if prepared.is_nonzero[polygon]:
+    if compiled.is_nonzero(polygon):
         n_listed = max(prepared.most_edges, min(MAX_LISTED_CROSSINGS, prepared.most_edges * height)) + 1
 
         def draw_rows(top: int, bottom: int) -> None:

@@ -38,7 +38,6 @@ class Prepared:
     most_edges: int  # of a polygon
     n_points: int
     frame: Frame
-    is_nonzero: npt.NDArray[np.uint8]  # of each polygon, the fill rule
 
     def __len__(self) -> int:
         return self.compiled.n_polygons
@@ -112,12 +111,9 @@ def prepare(memory: Memory, rings: RingSet, frame: Frame, *, is_nonzero: bool) -
             wide = np.zeros((n, 2), np.int64)
             snap(0, n)
     sides = rings.rings, rings.polygons, *frame.size
-    rules = np.full(len(rings), is_nonzero, np.uint8)
-    if rings.unions is not None:
-        rules |= rings.unions
-    compiled = engine.SnappedPolygons(x, y, wide, *sides, frame.grid_bits, rules)
+    compiled = engine.SnappedPolygons(x, y, wide, *sides, frame.grid_bits, is_nonzero, rings.unions)
     most = max(run_parts(compiled.bound, len(rings), n_threads)) if len(rings) else 0
-    return Prepared(compiled, most, n, frame, rules)
+    return Prepared(compiled, most, n, frame)
 
 
 def bad_point(rings: RingSet, x: npt.NDArray[np.int32], frame: Frame) -> ValueError:

@@ -143,18 +143,20 @@ def _without_tensors(values: Any) -> Any:
 
     Tests the first element of each list.
     """
-    if _is_tensor(values):
-        values = as_array("rings", values)
-        return values[:, 0] if values.shape[1:] == (1, 2) else values
-    if isinstance(values, (list, tuple)) and _has_tensors(values):
+    if isinstance(values, (list, tuple)):
+        if not _has_tensors(values):
+            return values
         return [*map(_without_tensors, values)] if isinstance(values, list) else (*map(_without_tensors, values),)
-    return values
+    if not _is_tensor(values):
+        return values
+    array = as_array("rings", values)
+    return array[:, 0] if array.shape[1:] == (1, 2) else array
 
 
 def _is_tensor(value: Any) -> bool:
-    if isinstance(value, np.ndarray) and value.shape[1:] == (1, 2):  # a contour of OpenCV
-        return True
-    if isinstance(value, (np.ndarray, np.generic)) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
+    if isinstance(value, np.ndarray):
+        return value.shape[1:] == (1, 2)  # a contour of OpenCV
+    if isinstance(value, np.generic) or hasattr(value, "to_numpy") or hasattr(value, "__geo_interface__"):
         return False
     return hasattr(value, "__dlpack__") or hasattr(value, "__array__")
 
