@@ -19,6 +19,35 @@ import topleft as tl
 SUPPORT = Path(__file__).parents[1] / "support"
 SIZE = (64, 48)
 
+FORKS = """
+import faulthandler, os, sys, threading, time
+import numpy as np, topleft as tl
+
+def pictures():
+    vertices, triangles = tl.scenes.blob(4_000)
+    texture = tl.Texture(np.arange(64 * 64 * 3, dtype=np.uint8).reshape(64, 64, 3))
+    mesh = tl.Mesh(vertices, triangles, uv=vertices[:, :2], materials=(tl.Material(texture=texture),))
+    image = tl.render(mesh, tl.Camera.framing(mesh), (64, 48), threads=2)
+    return image.tobytes() + tl.coverage(vertices[:, :2] * 30 + 30, triangles, (60, 60), threads=2).tobytes()
+
+expected = pictures()
+def draw():
+    while True:
+        pictures()
+for _ in range(3):
+    threading.Thread(target=draw, daemon=True).start()
+for i in range(20):
+    time.sleep(0.002 * (i % 7))
+    child = os.fork()
+    if not child:
+        faulthandler.dump_traceback_later(30, exit=True)
+        os._exit(pictures() != expected)
+    _, status = os.waitpid(child, 0)
+    if status:
+        sys.exit(f"fork {i}: {status}")
+os._exit(0)
+"""
+
 EXIT = """
 import sys, threading, time
 import topleft as tl
@@ -128,6 +157,14 @@ def test_a_child_of_a_process_that_has_drawn_draws(how):
     run = [sys.executable, "-c", script]
     ended = subprocess.run(run, capture_output=True, text=True, timeout=120, env=environment())
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "True\n", "")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork on this system")
+def test_a_child_forked_while_threads_draw_draws():
+    ended = subprocess.run(
+        [sys.executable, "-W", "ignore::DeprecationWarning", "-c", FORKS], capture_output=True, text=True, timeout=300
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("end", ["", "sys.exit(0)"])

@@ -11,13 +11,13 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent, save_image
 from topleft._core.base.array_types import Array, MeshLike
 from topleft._core.base.arrays import as_scale, as_size, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.notes import listening, tell
 from topleft._core.base.options import check_layers

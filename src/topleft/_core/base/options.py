@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import IntEnum, StrEnum
-from functools import cached_property
 from typing import Any, get_args
 
 from topleft._core.base.arrays import as_names
+from topleft._core.base.cached import cached_property
 from topleft.typing import LayerOption, SamplingOption
 
 

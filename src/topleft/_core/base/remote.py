@@ -9,11 +9,11 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from topleft._core.base.arrays import shown
+from topleft._core.base.cached import cached_property
 from topleft.errors import MissingPackageError
 
 #: File systems that show a file before it is whole: there it gets another name first. Stores of

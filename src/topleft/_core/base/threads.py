@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from topleft._core import engine
 from topleft._core.base.memory import SCRATCH
@@ -25,14 +25,36 @@ MIN_TRIANGLES_PER_THREAD = 2000
 #: Triangles or vertices that are worth one for less: a millisecond, where the first use of the pool takes four.
 MIN_ROWS_PER_THREAD = 50_000
 
+
+class ProcessLock:
+    """A lock of this process: a child of ``fork`` finds it free, since the thread that held it stayed with the parent.
+
+    `new`: `threading.Lock` or `threading.RLock`.
+    """
+
+    def __init__(self, new: Callable[[], Any] = threading.Lock) -> None:
+        self._new, self._lock = new, new()
+        if hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self._renew)
+
+    def _renew(self) -> None:
+        self._lock = self._new()
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.release()
+
+
 _pool: ThreadPoolExecutor | None = None
-_pool_lock = threading.Lock()
+_pool_lock = ProcessLock()
 
 
 def _forget_pool() -> None:
     """Drop the pool in a forked child: its threads stayed with the parent."""
-    global _pool, _pool_lock
-    _pool, _pool_lock = None, threading.Lock()
+    global _pool
+    _pool = None
 
 
 def _hear_signals() -> None:

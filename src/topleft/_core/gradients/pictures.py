@@ -9,7 +9,7 @@ import math
 import secrets
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.gradients.bands import Array, Band, Room, Sums
 from topleft._core.gradients.tensors import (

@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property
 from typing import Any, get_args
 
 import numpy as np
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts
 from topleft._core.gradients.bands import Array, Band, Bands, Room, Sums

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any, Literal, NamedTuple, Protocol, Self, overload
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_number, as_places, as_values, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.base.texels import ValueLevels, as_levels
 from topleft._core.raster.backward import Backward

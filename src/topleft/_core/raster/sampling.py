@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import FRESH, Memory, check_fits, empty
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeAlias, TypedDict
 
 import numpy as np
@@ -27,6 +26,7 @@ from topleft._core.base.arrays import (
     set_read_only,
     shown,
 )
+from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_FOV_Y_DEG, THREE_QUARTER_DEG
 from topleft._core.base.options import parse
 from topleft._meshes.camera.calibration import Calibration, of_colmap, of_nerfstudio, of_opengl, of_pytorch3d

@@ -8,13 +8,13 @@ Based on: M. Garland, P. S. Heckbert, "Surface Simplification Using Quadric Erro
 
 from __future__ import annotations
 
-import threading
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, I32
+from topleft._core.base.threads import ProcessLock
 from topleft.errors import MissingPackageError
 
 #: Scales to try in turn: the diameter of a mesh, per wanted triangle.
@@ -27,7 +27,7 @@ TOO_MANY = 1.25
 STUCK = 0.8
 
 #: The package keeps its mesh in a global variable.
-_lock = threading.Lock()
+_lock = ProcessLock()
 
 
 class Collapsed(NamedTuple):

@@ -9,7 +9,6 @@ rounding.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
+from topleft._core.base.cached import cached_property
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._meshes.model.mesh import coincident
 

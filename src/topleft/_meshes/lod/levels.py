@@ -10,7 +10,6 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -20,6 +19,7 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_path, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.camera.matrices import bounding_sphere
 from topleft._meshes.io.limits.budget import Budget

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
+from topleft._core.base.cached import cached_property
 from topleft._core.raster.clusters import RECORD, Clusters, box_of, measure_clusters, sort_clusters
 from topleft._meshes.model.cache import MeshCache
 from topleft._meshes.model.mesh import Mesh, read_only, with_normals

@@ -21,6 +21,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
 from topleft._core.base.arrays import shown
 from topleft._core.base.color import spread_colors
+from topleft._core.base.threads import ProcessLock
 from topleft._meshes.lod.collapse import STUCK, Collapsed, border_points, collapse, collapser, open_sides, wanted_of
 from topleft._meshes.lod.distance import TriangleTree, measure
 from topleft._meshes.lod.levels import Level, Levels, keep_levels, kept_levels
@@ -43,7 +44,7 @@ MOST_WHOLE = 2_000_000
 ATTRIBUTES = ("normals", "colors", "uv", "uv1")
 
 
-_lock = threading.RLock()
+_lock = ProcessLock(threading.RLock)
 
 
 class Corners(NamedTuple):

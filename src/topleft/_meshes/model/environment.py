@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +25,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import as_array, as_number, as_vector, set_read_only
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import LIGHT_OF_SRGB, Color, ColorLike, as_color, light_of
 from topleft._core.base.options import parse
 from topleft._meshes.model.light import TO_HEADLIGHT, as_not_negative

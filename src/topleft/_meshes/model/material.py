@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from topleft._core.base.arrays import as_number, as_vector
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import Color, ColorLike, as_color
 from topleft._core.base.options import parse
 from topleft._meshes.model.light import as_not_negative

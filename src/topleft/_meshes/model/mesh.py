@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32, U8
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_crease, set_read_only, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.options import parse
 from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters, box_of

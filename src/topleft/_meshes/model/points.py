@@ -6,7 +6,6 @@ Input: anything NumPy can read. Output: `Points`, whose arrays the other stages 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, U8
 from topleft._core.base.arrays import INT32_MAX, as_point_size, set_read_only
+from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_POINT_SIZE
 from topleft._core.base.options import parse
 from topleft._meshes.model.mesh import FloatArray, as_color_array, as_real_array, extreme_points, read_only

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64, U8, U16
 from topleft._core.base.arrays import as_array, set_read_only
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import LIGHT_OF_SRGB
 from topleft._core.base.options import parse
 from topleft._core.base.texels import (

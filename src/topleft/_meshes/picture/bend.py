@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64, I32
 from topleft._core.base.arrays import set_aligned
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import spread_colors
 from topleft._core.base.memory import empty
 from topleft._core.base.options import parse

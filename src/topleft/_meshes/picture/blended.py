@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, U8
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import LIGHT_OF_SRGB, LINEAR_ONE, srgb_tables
 from topleft._core.base.memory import SCRATCH
 from topleft._core.raster.fragments import Fragments, SampleBuffers

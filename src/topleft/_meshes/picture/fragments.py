@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from topleft._core import engine
 from topleft._core.base.array_types import F64
 from topleft._core.base.arrays import as_aligned, as_array, as_values, set_aligned, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, Viewer, view_of
 from topleft._core.raster.peel import DepthLayers

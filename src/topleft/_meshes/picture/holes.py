@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, I32
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import Memory
 from topleft._core.base.threads import run_parts, threads_for
 from topleft._core.raster.fragments import Fragments

@@ -9,7 +9,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, Array
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.base.options import LAYER_NAMES, check_layers
 from topleft._core.base.threads import run_parts, threads_for

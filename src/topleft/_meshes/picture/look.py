@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F32, F64
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import DEFAULT_COLOR, LIGHT_OF_SRGB, Color, light_of
 from topleft._core.base.memory import empty
 from topleft._core.base.threads import run_parts, threads_of_rows

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import operator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F64, I32, I64, MeshLike
 from topleft._core.base.arrays import as_array, as_count, as_number, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.memory import check_fits
 from topleft._core.base.options import check_choice

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from typing import Any, cast
 
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from topleft._core import engine
 from topleft._core.base.arrays import INT32_MAX, set_aligned
+from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import FRESH
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ import numpy.typing as npt
 from topleft._core import engine
 from topleft._core.base.array_types import F64, MeshLike
 from topleft._core.base.arrays import INT32_MAX, as_real, check_regular, set_read_only, shown
+from topleft._core.base.cached import cached_property
 from topleft._core.base.color import ColorLike
 from topleft._core.raster.clusters import Backoff
 from topleft._meshes.io.load import load
