@@ -123,9 +123,9 @@ def test_command_writes_to_a_store_and_resumes(memory, capsys):
     assert main(how) == 0
     assert sorted(memory.ls("/thumbs", detail=False)) == [f"/thumbs/cube-00{i}.png" for i in range(3)]
     memory.rm_file("/thumbs/cube-001.png")
-    memory.pipe_file("/thumbs/cube-002.png", b"kept")
+    made = memory.created("/thumbs/cube-002.png")
     assert main([*how, "--resume"]) == 0
-    assert memory.cat_file("/thumbs/cube-002.png") == b"kept"
+    assert memory.created("/thumbs/cube-002.png") == made
     assert memory.size("/thumbs/cube-001.png") > 100
     assert main(["render", "cube", "-o", "memory://folder/", "--size", "40x30"]) == 0
     assert memory.ls("/folder", detail=False) == ["/folder/cube.png"]

@@ -5,6 +5,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import topleft as tl
 from topleft.errors import MeshError, MeshWarning
@@ -144,7 +145,7 @@ def test_command_up_wins_over_the_axis_of_the_file(tmp_path, run):
     for name, more in (("a", []), ("b", []), ("a", ["--up", "y"]), ("b", ["--up", "z"])):
         out = tmp_path / f"{name}{len(more)}.png"
         assert run("render", tmp_path / f"{name}.dae", "-o", out, "--size", "32x32", *more)[0] == 0
-    a, a_up, b, b_up = ((tmp_path / f"{name}.png").read_bytes() for name in ("a0", "a2", "b0", "b2"))
+    a, a_up, b, b_up = (Image.open(tmp_path / f"{name}.png").tobytes() for name in ("a0", "a2", "b0", "b2"))
     assert (a, b) == (b_up, a_up)
     assert a != b
 

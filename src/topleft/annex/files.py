@@ -3,6 +3,7 @@
 from topleft._core.polygons.rle import encode_polygons
 from topleft._core.raster.rle import annotation_members, annotation_of
 from topleft._meshes.io import png
+from topleft._meshes.io.images import read_record, write_image
 from topleft._meshes.io.layer_files import layer_paths, save_layers
 from topleft._meshes.io.limits.budget import LIMITS, Budget
 from topleft._meshes.io.limits.npy import arrays_of
@@ -23,5 +24,7 @@ __all__ = [
     "load_polygons",
     "png",
     "read_picture",
+    "read_record",
     "save_layers",
+    "write_image",
 ]

@@ -22,7 +22,6 @@ from topleft._apps.batch.workers import Workers, signals_put_off, workers_of
 from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_count, as_number, shown
 from topleft._core.base.options import parse
-from topleft._core.base.whole_file import is_whole
 from topleft.errors import MeshWarning, MissingPackageError
 from topleft.typing import OnErrorOption, OrderOption
 
@@ -47,7 +46,7 @@ class Result:
     error : Exception or None
         The error of a job that failed.
     is_skipped : bool
-        Whether the job was left out because its files were there (`resume`).
+        Whether the job was left out because its files hold its picture (`resume`).
     warnings : tuple of str
         The parts of the file that the mesh lacks, a line each: missing textures, say.
     seconds : float
@@ -126,8 +125,10 @@ def render_batch(
     order : {"jobs", "completed"}
         Whether results come in the order of the jobs, or as soon as they are there.
     resume : bool
-        Leave out a job if all its files are there. A file is whole or not there, also after an interrupt. Each file
-        behind a URL costs a request.
+        Leave out a job if all its files are there and were made of equal scene, camera, size, options and layers, by
+        this version; all else is drawn again. Each file has a record of them: a digest, and the names of the files that
+        the mesh was read from, whose contents count. Functions count by their code and what they hold, not by what they
+        call. Files are whole or not there, also after an interrupt. Each file behind a URL costs three requests.
     chunk : int, optional
         How many neighbouring jobs of one scene are handed to a worker together: less to send for each picture. Unless
         given 1; on threads up to 4 of a list of jobs, fewer towards its end, of pictures of a megapixel at most; on a
@@ -270,7 +271,7 @@ def _one_by_one(jobs: Iterator[object], resume: bool) -> Iterator[Result]:
     runner = JobRunner()
     for index, item in enumerate(jobs):
         job = as_job(item, index)
-        if resume and _is_done(job):
+        if resume and runner.is_done(job):
             yield Result(index, job, is_skipped=True)
             continue
         (outcome,) = runner.draw([(index, job)])
@@ -316,10 +317,10 @@ def _chunks(
     `most` returns how many go together, from the first job and its index.
     """
     together: list[tuple[int, Job]] = []
-    n = 1
+    n, runner = 1, JobRunner()
     for index, item in enumerate(jobs):
         job = as_job(item, index)
-        if resume and _is_done(job):
+        if resume and runner.is_done(job):
             if together:
                 yield together, False
                 together = []
@@ -424,15 +425,6 @@ class _InFlight:
         while not task.has_arrived:
             self._done.get().has_arrived = True
         return task
-
-
-def _is_done(job: Job) -> bool:
-    """Return whether all files of a job are there and not empty; errors of a job appear when it is drawn."""
-    try:
-        files = job.files
-    except (TypeError, ValueError):
-        return False
-    return bool(files) and all(map(is_whole, files))
 
 
 def _bar(n_jobs: int | None) -> Any:

@@ -14,15 +14,16 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent, save_image
+from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent
+from topleft._apps.batch.made import FromFile, record_of
 from topleft._core.base.array_types import Array, MeshLike
 from topleft._core.base.arrays import as_scale, as_size, shown
 from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._core.base.notes import listening, tell
+from topleft._core.base.notes import Heard, listening, tell, tell_files
 from topleft._core.base.options import check_layers
 from topleft._core.base.remote import Location, as_location, location_of
-from topleft.annex.files import layer_paths, save_layers
+from topleft.annex.files import layer_paths, read_record, save_layers, write_image
 from topleft.annex.pictures import layers_of
 from topleft.typing import LayerOption
 
@@ -148,11 +149,14 @@ class Outcome:
     seconds: float = 0.0
 
 
+class Held:
+    """A function that returns a scene which another process has put somewhere; it counts as that scene."""
+
+
 @dataclass(frozen=True)
-class MeshFile:
+class MeshFile(FromFile):
     """A mesh that is in a file."""
 
-    path: str
     scale: float = 1.0
 
     def __call__(self) -> Mesh | Points:
@@ -182,7 +186,7 @@ class LoadedMeshes:
 
     def __init__(self, n: int) -> None:
         self._n = n
-        self._made: OrderedDict[Hashable, tuple[Any, Exception | None, list[str]]] = OrderedDict()
+        self._made: OrderedDict[Hashable, tuple[Any, Exception | None, Heard]] = OrderedDict()
         # One at a time: readers are not safe in threads (they change the process's warning filters).
         self._lock = threading.Lock()
 
@@ -198,12 +202,13 @@ class LoadedMeshes:
                         self._made.popitem(last=False)
         scene, error, lines = found
         tell(lines, stacklevel=1)
+        tell_files(lines.files)
         if error is not None:
             raise error.with_traceback(None)
         return scene
 
     @staticmethod
-    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None, list[str]]:
+    def _call(make: Callable[[], Any]) -> tuple[Any, Exception | None, Heard]:
         with listening() as lines:
             try:
                 made = make()
@@ -226,14 +231,37 @@ class JobRunner:
             start, picture, failure = time.perf_counter(), None, None
             with listening() as lines:
                 try:
-                    picture = self.draw_one(job)
+                    picture = self._draw_one(job, lines)
                 except Exception as error:
                     _clear_frames(error)
                     failure = error
             outcomes.append(Outcome(index, picture, failure, tuple(lines), time.perf_counter() - start))
         return outcomes
 
-    def draw_one(self, job: Job) -> Array | dict[str, Array] | None:
+    def is_done(self, job: Job) -> bool:
+        """Return whether all files of a job hold what it would draw; errors of a job appear when it is drawn."""
+        try:
+            files = job.files
+            records = {read_record(file) for file in files}
+            if len(records) != 1 or () in records:
+                return False
+            (record,) = records
+            scene = job.scene if _is_read(job.scene) else self._scene(job.scene, job.scale)
+        except Exception:  # of any reader: it appears when the job is drawn
+            return False
+        folder = Path(_home_of(job)).parent
+        return record == self._record(job, scene, [folder / name for name in record[1:]])
+
+    def _record(self, job: Job, scene: Any, files: Sequence[Path]) -> tuple[str, ...]:
+        """The record of the files of a job."""
+        subject = scene
+        if _is_read(job.scene):
+            subject = MeshFile(os.fspath(job.scene)) if isinstance(job.scene, str | os.PathLike) else job.scene
+        options = {name: value for name, value in job.options.items() if name != "threads"}
+        parts = job.files[0].suffix, job.checked.layers, job.checked.size, job.scale, options, job.camera, subject
+        return record_of(parts, _home_of(job), files)
+
+    def _draw_one(self, job: Job, heard: Heard) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
         layers, files, size = job.checked  # before any work: raises for an unknown format
         for file in files:
@@ -252,14 +280,15 @@ class JobRunner:
                 picture = render(scene, camera, size, rasterizer=rasterizer, **options)
             if job.destination is None:
                 return picture
-            save_image(files[0], picture, background=_opaque(options))
+            write_image(files[0], picture, background=_opaque(options), record=self._record(job, scene, heard.files))
             return None
         view = layers_of(scene, camera, size, rasterizer=rasterizer, **options)
         arrays = view.draw(layers)
         if job.destination is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
         matrix = None if view.shot.camera.lens is not None else view.shot.camera.clip_from_world(size)
-        save_layers(job.destination, arrays, matrix=matrix, background=_opaque(options))
+        record = self._record(job, scene, heard.files)
+        save_layers(job.destination, arrays, matrix=matrix, background=_opaque(options), record=record)
         return None
 
     def _scene(self, scene: Any, scale: float) -> Any:
@@ -274,6 +303,17 @@ class JobRunner:
         if kept is None or kept.size != size:
             kept = self._threads.rasterizer = Rasterizer(size, threads=1)
         return kept
+
+
+def _is_read(scene: object) -> bool:
+    """Whether a scene is a file or what a function returns, which are not called to compare them."""
+    return isinstance(scene, str | os.PathLike) or (callable(scene) and not isinstance(scene, Held))
+
+
+def _home_of(job: Job) -> str:
+    """The file of the scene, if it is of one."""
+    scene = job.scene
+    return os.fspath(scene) if isinstance(scene, str | os.PathLike) else getattr(scene, "path", "")
 
 
 def _clear_frames(error: BaseException | None) -> None:

@@ -13,12 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from topleft import Level, Levels, Mesh, Scene
-from topleft._apps.batch.jobs import Job, JobRunner, Outcome
+from topleft._apps.batch.jobs import Held, Job, JobRunner, Outcome
 from topleft.annex.pictures import keep_levels, levels_of
 from topleft.errors import MissingPackageError
 
@@ -199,15 +198,22 @@ class LocalProcesses(Workers):
         self._spool.close()
 
 
-def with_levels_of(scene: Any, coarser: list[tuple[Mesh, tuple[Level, ...], Any]]) -> Any:
-    """Return a mesh or scene after giving it its coarser levels."""
-    for mesh, *levels in coarser:
-        keep_levels(mesh, Levels(mesh, *levels))
-    return scene
+@dataclass(eq=False)
+class WithLevels(Held):
+    """A mesh or scene, and its coarser levels."""
+
+    scene: Any
+    coarser: list[tuple[Mesh, tuple[Level, ...], Any]]
+
+    def __call__(self) -> Any:
+        """Return it after giving it its levels."""
+        for mesh, *levels in self.coarser:
+            keep_levels(mesh, Levels(mesh, *levels))
+        return self.scene
 
 
 @dataclass
-class _Held:
+class _Place:
     scene: Any  # held, so that no other object gets its id
     at: Any
     n_users: int = 0
@@ -218,7 +224,7 @@ class HeldScenes:
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
-        self._entries: OrderedDict[tuple[int, bool], _Held] = OrderedDict()
+        self._entries: OrderedDict[tuple[int, bool], _Place] = OrderedDict()
 
     def put(self, held: Callable[[], Any]) -> Any:
         """Put a function that returns a scene where workers find it, and return where that is."""
@@ -237,8 +243,8 @@ class HeldScenes:
         key = id(scene), with_levels
         with self._lock:
             if key not in self._entries:
-                at = self.put(partial(with_levels_of, scene, coarser_levels_of(scene) if with_levels else []))
-                self._entries[key] = _Held(scene, at)
+                at = self.put(WithLevels(scene, coarser_levels_of(scene) if with_levels else []))
+                self._entries[key] = _Place(scene, at)
             entry = self._entries[key]
             self._entries.move_to_end(key)
             entry.n_users += 1
@@ -262,7 +268,7 @@ class HeldScenes:
 
 
 @dataclass(frozen=True)
-class SpooledMesh:
+class SpooledMesh(Held):
     """A mesh that another process has put into a file, and its levels of detail."""
 
     path: str

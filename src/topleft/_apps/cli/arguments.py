@@ -158,7 +158,7 @@ def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     add("--jobs", type=positive, default=1, metavar="N", help="pictures that are drawn side by side (default 1)")
     add("--dask", metavar="local|ADDRESS", help="draw on a Dask cluster: tcp://HOST:PORT, or --jobs processes here")
     add("--jobs-file", metavar="FILE", help="jobs to render, as TOML or JSON; see below")
-    add("--resume", action="store_true", help="leave out pictures that have files already")
+    add("--resume", action="store_true", help="leave out pictures whose files were made of this very input")
     add("--strict", action="store_true", help="exit with 1 if a mesh lacks something of its file: a texture, say")
     add("--report", metavar="FILE", help="the result of each picture, as JSON; see below")
     add(

@@ -18,6 +18,7 @@ import numpy as np
 
 from topleft import Camera, Environment, Material, Mesh, Points, Texture, load, load_cameras
 from topleft._apps.batch.jobs import Job
+from topleft._apps.batch.made import FromFile
 from topleft._apps.cli.arguments import UsageError, meant
 from topleft._core.base.color import DEFAULT_COLOR
 from topleft._core.base.defaults import DEFAULT_CREASE, DEFAULT_POINT_SIZE, SUFFIXES
@@ -36,10 +37,9 @@ MAX_FOLDERS = 200
 
 
 @dataclass(frozen=True)
-class MeshSource:
+class MeshSource(FromFile):
     """The mesh of a file, or the built-in shape of that name."""
 
-    name: str
     texture: str | None = None
     crease: float = DEFAULT_CREASE
     point_size: float = DEFAULT_POINT_SIZE
@@ -56,20 +56,20 @@ class MeshSource:
         if self.texture is None:
             return mesh
         if mesh.uv is None:
-            raise MeshError(f"--texture needs texture coordinates, and {self.name!r} has none")
+            raise MeshError(f"--texture needs texture coordinates, and {self.path!r} has none")
         return replace(mesh, materials=(Material(texture=read_texture(self.texture)),), material_of_triangle=None)
 
     def _mesh(self) -> Mesh | Points:
-        if self.name in SHAPES:
+        if self.path in SHAPES:
             if self.time is not None:
-                raise UsageError(f"--time needs a file with animations, got the built-in shape {self.name!r}")
-            vertices, triangles = shape(self.name)
+                raise UsageError(f"--time needs a file with animations, got the built-in shape {self.path!r}")
+            vertices, triangles = shape(self.path)
             return Mesh(vertices * self.scale, triangles, crease=self.crease)
-        if not Path(self.name).exists() and Path(self.name).name == self.name and "." not in self.name:
-            raise UsageError(f"there is no file and no built-in shape {self.name!r}; shapes: {', '.join(SHAPES)}")
+        if not Path(self.path).exists() and Path(self.path).name == self.path and "." not in self.path:
+            raise UsageError(f"there is no file and no built-in shape {self.path!r}; shapes: {', '.join(SHAPES)}")
         limits = dict(self.limits)
         return load(
-            self.name, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, root=None, **limits
+            self.path, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, root=None, **limits
         )
 
 
@@ -156,10 +156,9 @@ def mean_color(mesh: Mesh | Points) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True)
-class FileCamera:
+class FileCamera(FromFile):
     """A camera of the file of the mesh."""
 
-    path: str
     index: int
     time: float | None = None
     clip: int | str | None = None

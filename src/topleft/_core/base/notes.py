@@ -1,6 +1,6 @@
 """Notes of parts of a mesh file that could not be read, one line a kind; given as warnings, or to a listener.
 
-Input: kinds and names, from the readers. Output: `MeshWarning`, or lines.
+Input: kinds and names, and the files that were read, from the readers. Output: `MeshWarning`, or lines.
 """
 
 from __future__ import annotations
@@ -9,13 +9,23 @@ import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from pathlib import Path
 
 from topleft.errors import MeshWarning
 
 N_NAMES = 3
 """Names of a kind that a line lists."""
 
-_listener: ContextVar[list[str] | None] = ContextVar("topleft_notes", default=None)
+
+class Heard(list[str]):
+    """The lines that a listener gets."""
+
+    def __init__(self) -> None:
+        self.files: list[Path] = []
+        """The files that were read, or looked for."""
+
+
+_listener: ContextVar[Heard | None] = ContextVar("topleft_notes", default=None)
 
 
 class Notes:
@@ -58,10 +68,17 @@ def tell(lines: Iterable[str], stacklevel: int) -> None:
         warnings.warn(line, MeshWarning, stacklevel=stacklevel + 1)
 
 
+def tell_files(files: Iterable[Path]) -> None:
+    """Tell a listener of files that were read, or looked for."""
+    heard = _listener.get()
+    if heard is not None:
+        heard.files.extend(files)
+
+
 @contextmanager
-def listening() -> Iterator[list[str]]:
+def listening() -> Iterator[Heard]:
     """A list that gets the lines that this thread would be warned of."""
-    heard: list[str] = []
+    heard = Heard()
     token = _listener.set(heard)
     try:
         yield heard

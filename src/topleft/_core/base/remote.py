@@ -146,6 +146,12 @@ class RemotePath:
         fs, name = self._reached
         return bytes(fs.cat_file(name))
 
+    def ends(self, n: int) -> bytes:
+        """Return the first and the last `n` bytes, or all of a short file."""
+        fs, name = self._reached
+        size = self.size()
+        return bytes(fs.cat_file(name, 0, min(n, size)) + fs.cat_file(name, max(min(n, size), size - n), size))
+
     def write_bytes(self, content: bytes) -> None:
         """Write the file, whole or not at all."""
         fs, name = self._reached

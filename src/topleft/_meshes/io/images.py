@@ -6,9 +6,12 @@ Input: an array, or several by name. Output: PNG, JPEG, WebP, TIFF, .npy or .npz
 from __future__ import annotations
 
 import io
+import json
 import os
+import re
+import struct
 from collections.abc import Mapping
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +20,7 @@ from topleft._core.base.arrays import as_array
 from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.georeference import geo_tags, nodata_tag
 from topleft._core.base.grid import Grid
-from topleft._core.base.remote import Location, as_location
+from topleft._core.base.remote import Location, RemotePath, as_location
 from topleft._core.base.tiff import Tags
 from topleft._core.base.whole_file import write_whole
 from topleft._meshes.io import png, tiff
@@ -48,6 +51,13 @@ PILLOW_OPTIONS: Mapping[str, tuple[str, dict[str, Any]]] = {
 
 #: Pixels a side that libjpeg and WebP encode.
 MOST_SIDE = {".jpg": 65_500, ".jpeg": 65_500, ".webp": 16_383}
+
+
+RECORD = "topleft:made"
+"""The word before the record of a file."""
+
+ENDS_BYTES, MOST_OF_RECORD = 1 << 16, 1 << 15
+"""Records lie in the first or the last bytes of a file; a longer one is not written."""
 
 
 def save_image(
@@ -98,7 +108,15 @@ def save_image(
     ...     Path(folder, "mask.png").exists()
     True
     """
-    place = as_location("path", path)
+    write_image(as_location("path", path), image, background=background, text=text, grid=grid)
+
+
+def write_image(
+    place: Location, image: npt.NDArray[Any] | Mapping[str, npt.NDArray[Any]], *,
+    background: tuple[int, int, int] = (255, 255, 255), text: Mapping[str, str] | None = None, grid: Grid | None = None,
+    record: tuple[str, ...] = (),
+) -> None:  # fmt: skip
+    """`save_image`, with a record that `read_record` returns: a note in the file, or behind the array of .npy."""
     suffix = place.suffix.lower()
     if suffix not in SUFFIXES:
         raise ImageError(f"cannot write {str(place)!r}: format {place.suffix!r} is none of {' '.join(SUFFIXES)}")
@@ -106,36 +124,71 @@ def save_image(
         raise ImageError(f"cannot write {str(place)!r}: text goes into .png only")
     if grid is not None and suffix not in (".tif", ".tiff"):
         raise ImageError(f"cannot write {str(place)!r}: a grid goes into .tif only")
+    listed = json.dumps(record) if record else ""
+    note = f"{RECORD} {listed}".encode() if 0 < len(listed) < MOST_OF_RECORD else b""
     if suffix == ".npz":
         arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
-        write_whole(place, lambda file: np.savez_compressed(file, **arrays))
+        write_whole(place, lambda file: _write_npz(file, arrays, note))
         return
     if isinstance(image, Mapping):
         raise ImageError(f"cannot write {str(place)!r}: several arrays by name need .npz")
     picture = as_array("image", image)
     if suffix == ".npy":
-        write_whole(place, lambda file: np.save(file, picture, allow_pickle=False))
+        write_whole(place, lambda file: _write_npy(file, picture, note))
         return
     if picture.dtype == np.bool_:
         picture = np.where(picture, np.uint8(255), np.uint8(0))
     picture = picture.astype(picture.dtype.newbyteorder("="), copy=False)
     _check_holds(place, picture)
     if suffix == ".png":
-        write_whole(place, lambda file: file.writelines(png.pieces(picture, text=text)))
+        notes = {**(text or {}), **({RECORD: listed} if note else {})}
+        write_whole(place, lambda file: file.writelines(png.pieces(picture, text=notes)))
         return
     if suffix in (".tif", ".tiff"):
-        place_tags = None if grid is None else _geo_tags(grid, picture)
-        write_whole(place, lambda file: file.writelines(tiff.pieces(picture, place_tags)))
+        tags: Tags = {} if grid is None else _geo_tags(grid, picture)
+        tags |= {270: ("s", note + b"\0")} if note else {}  # ImageDescription
+        write_whole(place, lambda file: file.writelines(tiff.pieces(picture, tags)))
         return
     if suffix in (".jpg", ".jpeg") and picture.shape[2:] == (4,):
         picture = composite(picture, background)
     from PIL import Image  # 10 ms that PNG does without
 
     kind, options = PILLOW_OPTIONS[suffix]
+    if note:
+        exif = Image.Exif()
+        exif[270] = note.decode()  # ImageDescription
+        options = {**options, "exif": exif}
     # In memory first: Pillow's JPEG encoder does not notice a disk that is full.
     encoded = io.BytesIO()
     Image.fromarray(picture).save(encoded, format=kind, **options)
     write_whole(place, lambda file: file.write(encoded.getbuffer()))
+
+
+def _write_npy(file: IO[bytes], array: npt.NDArray[Any], note: bytes) -> None:
+    np.save(file, array, allow_pickle=False)
+    file.write(note)
+
+
+def _write_npz(file: IO[bytes], arrays: dict[str, Any], note: bytes) -> None:
+    np.savez_compressed(file, **arrays)
+    file.seek(-2, os.SEEK_END)
+    file.write(struct.pack("<H", len(note)) + note)  # the comment of the archive
+
+
+def read_record(path: Location) -> tuple[str, ...]:
+    """The record of a file of `write_image`; empty where there is no such file, or no record in it."""
+    try:
+        if isinstance(path, RemotePath):
+            ends = path.ends(ENDS_BYTES)
+        else:
+            with path.open("rb") as file:
+                ends = file.read(ENDS_BYTES)
+                file.seek(max(len(ends), file.seek(0, os.SEEK_END) - ENDS_BYTES))
+                ends += file.read()
+        found = re.search(rf"{RECORD}[\0 ](\[.*)", ends.decode("latin-1"), re.DOTALL)
+        return () if found is None else tuple(json.JSONDecoder().raw_decode(found[1])[0])
+    except (OSError, ValueError):
+        return ()
 
 
 def _geo_tags(grid: Grid, picture: npt.NDArray[Any]) -> Tags:

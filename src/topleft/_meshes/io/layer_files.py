@@ -20,7 +20,7 @@ from topleft._core.base.array_types import Array
 from topleft._core.base.arrays import as_number
 from topleft._core.base.defaults import SUFFIXES
 from topleft._core.base.remote import Location, as_location, location_of
-from topleft._meshes.io.images import save_image
+from topleft._meshes.io.images import write_image
 from topleft.errors import ImageError
 
 RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentric": (0.0, 1.0)}
@@ -53,6 +53,7 @@ def save_layers(
     scale: float | None = None,
     matrix: npt.NDArray[np.float64] | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
+    record: tuple[str, ...] = (),
 ) -> tuple[Location, ...]:
     """Write layers, each file whole or not at all; returns the files.
 
@@ -76,6 +77,8 @@ def save_layers(
         depth of a camera that has none.
     background : (3,) of 0 to 255
         The colour behind in JPEG.
+    record : tuple of str
+        A note for `read_record`.
     """
     place = as_location("path", destination)
     if scale is not None:
@@ -84,12 +87,12 @@ def save_layers(
             raise ValueError(f"scale must be positive and finite, got {scale}")
     paths = layer_paths(place, list(layers))
     if place.suffix.lower() == ".npz" and "{layer}" not in str(place):
-        save_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix})
+        write_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix}, record=record)
         return (place,)
     # All are converted before the first is written: a layer that does not fit leaves no file.
     stored = {name: _stored(paths[name], name, array, scale) for name, array in layers.items()}
     for name, (array, text) in stored.items():
-        save_image(paths[name], array, background=background, text=text)
+        write_image(paths[name], array, background=background, text=text, record=record)
     return tuple(paths.values())
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from topleft._core.base.arrays import as_crease, as_path, as_scale, as_seconds, shown
 from topleft._core.base.defaults import DEFAULT_CREASE
-from topleft._core.base.notes import tell
+from topleft._core.base.notes import tell, tell_files
 from topleft._meshes.io.limits.budget import Budget, OverLimitError
 from topleft._meshes.io.references import InputFile, Moment
 from topleft._meshes.model.joined import joined
@@ -154,6 +154,7 @@ def load(
     source = InputFile(checked, budget, home=home)
     source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
+    tell_files(source.files())
     tell(source.notes.lines, stacklevel=2)
     return mesh if scale == 1 else scaled(mesh, scale)
 

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core.base.array_types import U8
-from topleft._core.base.notes import Notes
+from topleft._core.base.notes import Notes, tell_files
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.model.texture import MAX_TEXTURE_SIZE
 from topleft.errors import ImageError, MeshError
@@ -154,6 +154,11 @@ class InputFile:
             self._listings[path.parent] = {other.name.casefold(): other for other in others if other.is_file()}
         return self._listings[path.parent].get(path.name.casefold())
 
+    def files(self) -> list[Path]:
+        """The file, those that it names, and where others that it names would be."""
+        wanted = (folder / name if path is None else path for (folder, name), path in self._found.items())
+        return [self.path, *(path for path in wanted if "\0" not in str(path) and self._is_at_home(path))]
+
     def picture(self, name: str, folder: Path | None = None) -> U8 | None:
         """The picture (H, W, 4) of a file that the mesh names; each is read once, whatever names it has."""
         path = self.find(name, "textures", folder)
@@ -271,6 +276,7 @@ def read_picture(path: str) -> U8:
     if not Path(path).is_file() and Path(path).exists():
         raise ImageError(f"cannot read {path!r}: it is no file")
     try:
+        tell_files([Path(path)])
         budget = Budget(path)
         budget.read(Path(path).stat().st_size)
         with opened(Path(path).read_bytes()) as image:
