@@ -165,7 +165,7 @@ static void strip_columns(const tl_triangle *t, double top_fx, double bottom_fx,
         const double a = y1 == y0 ? x0 : x0 + (first - y0) * slope, b = y1 == y0 ? x1 : x0 + (end - y0) * slope;
         low = lesser(low, lesser(a, b)), high = greater(high, greater(a, b));
     }
-    /* below 2^30 the error is far below a pixel; beyond, all columns are taken */
+    /* narrow: the error is below 2^-20 sub-pixels; otherwise all columns are taken */
     *left = t->is_narrow ? floor(low / unit) - 1.0 : -INFINITY;
     *right = t->is_narrow ? floor(high / unit) + 2.0 : INFINITY;
 }

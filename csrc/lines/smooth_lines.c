@@ -94,8 +94,9 @@ TL_INLINE vd lane_square(vd u, vd v, vd du, vd dv, vd inverse, vd end, vd *along
     return vd_select(before, vd_add(vd_mul(u, u), vd_mul(v, v)), square);
 }
 
-/* Draws a line of less than 2^24 sub-pixels: products of two distances are exact in float64.  The gain beside
- * `walk_far_line` alone is 3.4 on the median, 2.7 with depth, in the scenes of `draw_lanes`. */
+/* Draws a line of less than 2^24 sub-pixels: products of two distances are exact in float64, and coverage errs by less
+ * than 2^-23.  The gain beside `walk_far_line` alone is 3.4 on the median, 2.7 with depth, in the scenes of
+ * `draw_lanes`. */
 TL_INLINE void walk_smooth_line(smooth_state *s, const smooth_line *l, int has_depth)
 {
     const int bits = s->window->subpixel_bits;

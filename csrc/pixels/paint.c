@@ -84,7 +84,8 @@ static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, in
     return terms_sign(terms, 3) * edge_sign(p[0], p[1], p[2], &counts);
 }
 
-/* The exact value of a channel rounded to nearest, ties to even; `value` suffices unless it is close to a tie. */
+/* The exact value of a channel rounded to nearest, ties to even; `value`, which errs by less than 2^-20, suffices
+ * unless it is close to a tie. */
 static inline uint8_t round_color(const resolve_state *s, int64_t x_px, int64_t y_px, int bits, int c0, int d1, int d2,
                                   double value)
 {

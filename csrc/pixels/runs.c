@@ -636,10 +636,10 @@ TL_INLINE void put_exact_edge(shade_runs *s, int slot, int k, vd e, vd step, vi 
 /* Like `find_edges`, for corners x and y in pixels that are not snapped; sets the area, too.
  *
  * Edge functions are counted in 2^-24 of twice the area: an integer, exact modulo 2^32 at every column, and a rest,
- * float32, which stays below 17 and errs by less than 2^-20.  The sum of both is rounded once.  Both are computed in
+ * float32, which stays below 17 and errs by less than 2^-19.  The sum of both is rounded once.  Both are computed in
  * float64 at the column of the block that is nearest to corner 0, and rests from the middle of the block.  So E / area
- * errs by 2^-24 of itself, 2^-44, and the error of float64: less than 2^-50 boxes over areas.  No result depends on the
- * window: columns and rows are those of the picture. */
+ * errs by 2^-24 of itself, 2^-43, and the error of float64: less than 2^-48 boxes, at least a pixel wide, over areas.
+ * No result depends on the window: columns and rows are those of the picture. */
 TL_INLINE vm find_exact_edges(shade_runs *s, int slot, int64_t row, const vd *x, const vd *y, vf *col_step,
                               vf *row_step, vf *area)
 {

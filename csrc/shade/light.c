@@ -25,7 +25,7 @@ TL_INLINE void normalize3(vf *a)
         a[k] = vf_mul(a[k], scale);
 }
 
-/* 2^a, with a relative error of 2^-22; 0 from -126 down. */
+/* 2^a for -126 <= a <= 127, with a relative error of 2^-22; 0 below -126.5. */
 TL_INLINE vf vf_exp2(vf a)
 {
     const vf low = vf_max(a, vf_set1(-127.0f));

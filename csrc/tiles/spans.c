@@ -4,7 +4,7 @@
  * A span may have windows too many, never too few: the box of a triangle is widened by TL_SPAN_MARGIN_PX, which is more
  * than the snap can move a vertex (half a pixel at most) plus a pixel's square.  A triangle of more than one row and
  * column of windows is cut by each row, so that a long thin triangle is not listed in all of its box.  The point where
- * an edge enters a row is computed in float64: its error is below 2^-50 of the largest coordinate, and TL_SPAN_SLACK of
+ * an edge enters a row is computed in float64: its error is below 2^-49 of the largest coordinate, and TL_SPAN_SLACK of
  * it is added. */
 #ifndef TL_SPANS_C
 #define TL_SPANS_C

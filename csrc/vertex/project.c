@@ -58,7 +58,8 @@ static inline unsigned outside_planes(const double *p, const tl_view *view)
     return out;
 }
 
-/* Perspective divide and viewport.  x_px = (x/w + 1) * (width/2), each operation rounded once. */
+/* Perspective divide and viewport.  x_px = (x/w + 1) * (width/2), each operation rounded once: so x_px errs by less
+ * than 2^-51 of |x_px| + width. */
 static inline void set_projected(const double *p, const tl_view *view, int was_cut, double *out)
 {
     double z = view->zero_to_one ? p[2] / p[3] : (p[2] / p[3] + 1.0) * 0.5;
