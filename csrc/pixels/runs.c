@@ -702,76 +702,12 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     return is_special;
 }
 
-/* Prefetching saves nothing with fewer triangles: shading takes 1.02 times as long with 300,000, 1.1 to 1.2 with
- * 120,000. */
-#define TL_FETCHED_TRIANGLES 500000
-#define TL_FETCH_RUNS 32 /* runs ahead for which the rows of the corners are prefetched */
-
-/* Prefetches a row by its address: indices are not checked yet. */
-TL_INLINE void fetch_row(const void *rows, uintptr_t n_bytes, int32_t row)
-{
-    __builtin_prefetch((const void *)((uintptr_t)rows + (uint32_t)row * n_bytes));
-}
-
-TL_INLINE void fetch_vertex(const shade_runs *s, int32_t corner)
-{
-    const tl_exact_points *exact = s->snapped->mesh.exact;
-    if (exact)
-        fetch_row(exact->points, sizeof(double) * (unsigned)exact->stride, corner);
-    else
-        fetch_row(s->snapped->mesh.vertices, sizeof(tl_vertex), corner);
-}
-
-/* Prefetches the corner indices of runs [first, end), and the normals of their faces. */
-TL_INLINE void fetch_triangles(const shade_runs *s, int first, int end)
-{
-    const tl_shading *shading = s->shading;
-    for (int slot = first; slot < end; slot++) {
-        const int32_t id = s->ints[RUN_ID][slot];
-        fetch_row(s->snapped->triangles, 12, id);
-        if (shading && shading->face_normals)
-            fetch_row(shading->face_normals, 16, id);
-        else if (shading && shading->normal_of_corner)
-            fetch_row(shading->normal_of_corner, 12, id);
-    }
-}
-
-/* Prefetches the rows of the corners of runs [first, end). */
-TL_INLINE void fetch_corners(const shade_runs *s, int first, int end)
-{
-    const tl_shading *shading = s->shading;
-    const tl_source *source = s->snapped->mesh.source;
-    for (int slot = first; slot < end; slot++) {
-        const int64_t at = 3 * (int64_t)s->ints[RUN_ID][slot];
-        for (int k = 0; k < 3; k++) {
-            const int32_t corner = s->snapped->triangles[at + k];
-            fetch_vertex(s, corner);
-            if (shading->normal_of_corner)
-                fetch_row(shading->corner_normals, 16, shading->normal_of_corner[at + k]);
-            if (!shading->normal_of_corner || !shading->finds_inverse_w)
-                fetch_row(shading->normals, 16, corner);
-            if (shading->finds_inverse_w)
-                fetch_row(source->data, source->scalar == TL_F32 ? 12 : 24, corner);
-            if (s->needs_uv)
-                fetch_row(shading->uv, 8, corner);
-            if (s->needs_colors)
-                fetch_row(shading->colors, 16, corner);
-        }
-    }
-}
-
 /* Stores the corners of all runs, times 2^shift.  This is a pass by itself because a vector load stalls on numbers that
  * were just stored one by one. */
-TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
+TL_INLINE void keep_corners(shade_runs *s, int shift)
 {
-    const int end = TL_LANES + s->n_runs;
-    if (fetches)
-        fetch_triangles(s, TL_LANES, (int)min64(end, TL_LANES + 2 * TL_FETCH_RUNS));
-    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        const int ahead = slot + 2 * TL_FETCH_RUNS;
+    for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
         vi corners[3];
-        if (fetches)
-            fetch_triangles(s, ahead, (int)min64(end, ahead + TL_LANES));
         run_corners(s, slot, corners);
         for (int k = 0; k < 3; k++)
             vi_store(s->corners[k] + slot, vi_shift_left(corners[k], shift));
@@ -779,17 +715,12 @@ TL_INLINE void keep_corners(shade_runs *s, int fetches, int shift)
 }
 
 /* Sets edge functions and attributes of the runs of a row, a vector of runs at a time. */
-TL_INLINE void set_any_runs(shade_runs *s, int64_t row, int fetches)
+TL_INLINE void set_any_runs(shade_runs *s, int64_t row)
 {
     const int end = TL_LANES + s->n_runs;
-    keep_corners(s, fetches, 0);
-    if (fetches)
-        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
+    keep_corners(s, 0);
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        const int ahead = slot + TL_FETCH_RUNS;
         run_setup r;
-        if (fetches)
-            fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
         for (int k = 0; k < 3; k++)
             vi_spill(r.corners[k], vi_load(s->corners[k] + slot));
         vi_store(s->ints[RUN_SPECIAL] + slot, vi_set1(0));
@@ -831,21 +762,16 @@ TL_INLINE float largest_lane(vf a)
 
 /* Sets up runs that need only normals of vertices; 0 if a run is special.  The passes are short, so that several
  * vectors of runs overlap. */
-TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exact)
+TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int is_exact)
 {
     const int end = TL_LANES + s->n_runs;
     const run_origin origin = origin_of_runs(s, row);
     vm is_special = vm_first(0);
     vf most = vf_set1(0.0f);
-    keep_corners(s, fetches, 1);
-    if (fetches)
-        fetch_corners(s, TL_LANES, (int)min64(end, TL_LANES + TL_FETCH_RUNS));
+    keep_corners(s, 1);
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        const int ahead = slot + TL_FETCH_RUNS;
         vi x[3], y[3];
         vf col_step[3], row_step[3];
-        if (fetches)
-            fetch_corners(s, ahead, (int)min64(end, ahead + TL_LANES));
         if (is_exact) {
             vd x_px[3], y_px[3];
             vf area;
@@ -877,16 +803,15 @@ TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int fetches, int is_exa
 TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
     const tl_shading *shading = s->shading;
-    const int fetches = s->snapped->n_triangles >= TL_FETCHED_TRIANGLES, end = TL_LANES + s->n_runs;
-    const int is_exact = s->snapped->mesh.exact != NULL;
+    const int end = TL_LANES + s->n_runs, is_exact = s->snapped->mesh.exact != NULL;
     s->n_special = 0;
     s->max_min_length = INFINITY;
     if (!s->n_runs)
         return;
     /* fills the last vector with a valid triangle */
     vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
-    if (!s->is_plain || !(is_exact ? set_plain_runs(s, row, fetches, 1) : set_plain_runs(s, row, fetches, 0)))
-        set_any_runs(s, row, fetches);
+    if (!s->is_plain || !(is_exact ? set_plain_runs(s, row, 1) : set_plain_runs(s, row, 0)))
+        set_any_runs(s, row);
     if (shading->material_of)
         for (int slot = TL_LANES; slot < end; slot++)
             s->ints[RUN_MATERIAL][slot] = shading->material_of[s->ints[RUN_ID][slot]];

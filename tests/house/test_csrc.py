@@ -146,7 +146,7 @@ READERS_OF_INDICES = {
 
 
 def test_indices_are_read_in_few_places():
-    first_looks = r"(first_bad_row|fetch_rows|fetch_listed)\([^;]*;"  # checks of all, and mere prefetches
+    first_looks = r"(first_bad_row|fetch_rows?|fetch_listed)\([^;]*;"  # checks of all, and mere prefetches
     named = r"(snapped|mesh|fans|\bs|\bc)(->|\.)triangles\b(?!\s*=)"
     assert {name for name in FILES if re.search(named, re.sub(first_looks, "", code_of(name)))} == READERS_OF_INDICES
 
