@@ -16,10 +16,9 @@ TESTS = [None, "less", "greater"]
 
 
 @contextmanager
-def bands(*, are_drawn, in_place=False):
-    """Draw in bands of few rows wherever that is possible, or nowhere; in the picture, or in memory of their own."""
+def bands(*, are_drawn):
+    """Draw in bands of few rows wherever that is possible, or nowhere."""
     rows = {"near_pixels": 0 if are_drawn else 1 << 40, "cleared_pixel": 1e6, "plane_bytes": 8 * 333 * 20}
-    rows["far_bytes"] = 1 << 40 if in_place else 0
     with choices.forced(rows_to_blend=lambda view, *_, **__: 13 if are_drawn else view.size[1], **rows):
         yield
 
@@ -34,18 +33,18 @@ def strewn(seed, n=300, size_px=60.0):
     return corners.reshape(-1, 3), np.arange(3 * n, dtype=np.int32).reshape(n, 3)
 
 
-def as_drawn(draw, *, in_place=False):
+def as_drawn(draw):
     """What is drawn at once, and in bands."""
-    with bands(are_drawn=False, in_place=True):
+    with bands(are_drawn=False):
         whole = draw()
-    with bands(are_drawn=True, in_place=in_place):
+    with bands(are_drawn=True):
         return whole, draw()
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize(("threads", "in_place"), [(1, False), (3, False), (3, True)])
+@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("test", TESTS)
-def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads, in_place):
+def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads):
     vertices, triangles = strewn(1)
     for cull in ("none", "back", "front"):
 
@@ -54,7 +53,7 @@ def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads, in_place):
             return found.triangle, found.depth
 
         with on(isa):
-            (ids, depth), (banded_ids, banded_depth) = as_drawn(draw, in_place=in_place)
+            (ids, depth), (banded_ids, banded_depth) = as_drawn(draw)
         assert (ids >= 0).any()
         assert (banded_ids == ids).all()
         assert banded_depth.tobytes() == depth.tobytes()
@@ -77,7 +76,7 @@ def test_counts_and_colours_in_bands_equal_the_whole(force, isa):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("columns", [slice(0, 333), slice(90, 210)])
-def test_samples_in_memory_of_a_band_equal_those_in_place(isa, columns):
+def test_samples_in_bands_equal_the_whole(isa, columns):
     vertices, triangles = strewn(5, 150, 25.0)
     vertices[:, 0] = vertices[:, 0] % (columns.stop - columns.start) + columns.start
     for sampling, test in (("msaa2", "less"), ("msaa4", "greater"), ("msaa8", None)):
