@@ -7,7 +7,7 @@ import pytest
 
 import topleft as tl
 from topleft._apps.tiles.dask_array import WindowJob
-from topleft._meshes.windows.jobs import MappedJob, SentJob
+from topleft._meshes.windows.raster import MappedJob, SentJob
 
 RNG = np.random.default_rng(8)
 POINTS = RNG.uniform([1000, 2000, 0], [1090, 2061, 9], (80, 3))

@@ -18,8 +18,8 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.array_types import Array
-from topleft._core.base.arrays import as_count, as_number, as_pair, as_path, as_size
+from topleft._core.base.array_types import I32, Array
+from topleft._core.base.arrays import as_aligned, as_count, as_number, as_pair, as_path, as_size
 from topleft._core.base.grid import Extent, ExtentLike, Grid
 from topleft._core.base.options import check_choice
 from topleft._core.base.threads import available_threads, parse_threads
@@ -28,8 +28,7 @@ from topleft._meshes.windows import areas, drawing
 from topleft._meshes.windows.ahead import in_order, kept_memory
 from topleft._meshes.windows.areas import AreaIndex, Areas, are_polygons, areas_of, extent_of_polygons
 from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, open_triangles
-from topleft._meshes.windows.drawing import ON_GRIDS, Crop, painter_of, without_values
-from topleft._meshes.windows.jobs import MappedJob, SentJob
+from topleft._meshes.windows.drawing import ON_GRIDS, Crop, Painter, Payload, painter_of, without_values
 from topleft._meshes.windows.spans import SPAN_BYTES, Tiling, WindowIndex
 from topleft.typing import RasterKindOption, YOption
 
@@ -82,6 +81,35 @@ class Window:
     def __repr__(self) -> str:
         height, width = self.pixels.shape[:2]
         return f"Window(row {self.row}, column {self.column}: {width}x{height} at ({self.x}, {self.y}))"
+
+
+@dataclass(frozen=True)
+class SentJob:
+    """A window with all that it needs, to be drawn in another process."""
+
+    painter: Painter
+    payload: Payload
+    crop: Crop
+
+    def __call__(self) -> Array:
+        """Draw it."""
+        return self.painter.window(self.payload, self.crop)
+
+
+@dataclass(frozen=True)
+class MappedJob:
+    """A window of a mesh in files: it carries their names and the indices of its triangles."""
+
+    triangles: Triangles
+    painter: Painter
+    which: I32
+    crop: Crop
+
+    def __call__(self) -> Array:
+        """Draw it."""
+        which = as_aligned(self.which)  # bytes that were received lie anywhere
+        payload = self.painter.gather(self.triangles, which, kept_memory())
+        return self.painter.window(payload, self.crop)
 
 
 class WindowedRaster:
