@@ -68,8 +68,8 @@ def crossings(source: Source) -> None:
     """Crossings of narrow rings: the product with 1 / D gives the column of the exact quotient."""
     coordinate = source.constant("polygons/polygons.h", "TL_NARROW_POLYGON")
     # N is dy times the crossing less the sample, which lies between the ends of the edge less the sample; D = unit dy.
-    height, across = 2 * coordinate, coordinate + 2**16
-    numerator = height * across + height * 2**16
+    height, across = 2 * coordinate, coordinate + source.finest()
+    numerator = height * across + height * source.finest()
     need(2 * numerator < 2**53, "N + D - 1/2 is not exact")
     need(2 * numerator * ((1 + DOUBLE) ** 2 - 1) < 1, "a quotient may pass an integer")
 
@@ -137,7 +137,7 @@ def lines(source: Source) -> None:
 @claim("range", "squares", "raster/walk.h", "no farther than a pixel outside the extent: |E| < 2^63 or 2^127")
 def squares(source: Source) -> None:
     """Edge functions of corners of squares up to a pixel outside, and what walkers step, one row or column beyond."""
-    unit = 2**16
+    unit = source.finest()
     for macro, bits in (("TL_NARROW_LIMIT", 64), ("TL_WIDE_LIMIT", 128)):
         extent = 2 * (source.constant("vertex/fixed.h", macro) - 1)
         corner = (extent + 2 * unit) ** 2
@@ -180,7 +180,7 @@ def grid_edges(source: Source) -> None:
 def wide_edges(source: Source) -> None:
     """Where an edge of any length enters a row, in 128 bits."""
     extent = 2 * (source.constant("vertex/fixed.h", "TL_WIDE_LIMIT") - 1)
-    unit = 2**16
+    unit = source.finest()
     need((unit - 1) * extent + extent * extent < 2**126 + 2**79, "a numerator is larger")
     source.says("area/ramp.c", "i128_product(ta, dx)", "i128_product(tb - ta, dx)", "dx < 0 ? i128_add(xa, step) : xa")
     need(2**126 + 2**79 < 2**127, "a numerator leaves 128 bits, from either end of the row")
@@ -245,7 +245,7 @@ def clouds(source: Source) -> None:
         source.numbers(name, r"MOST_POINT_PX = 1 << (\d+)"),
         source.numbers(name, r"WINDOW_FX = 1 << (\d+)"),
     )
-    need((2**most * 2**16) ** 2 <= 2**60, "a square exceeds 2^60")
+    need((2**most * source.finest()) ** 2 <= 2**60, "a square exceeds 2^60")
     need(2 * 2**farthest + 2**31 * 2**17 + 2**31 + 2**31 < 2**63, "a row leaves 64 bits")
 
 
@@ -253,7 +253,7 @@ def clouds(source: Source) -> None:
 def rings(source: Source) -> None:
     """Rings: differences of narrow points, pieces in 64 bits, of wide points in 128, and the snap in float64."""
     narrow = source.constant("polygons/polygons.h", "TL_NARROW_POLYGON")
-    wide, unit = source.constant("polygons/polygons.h", "TL_POLYGON_LIMIT"), 2**16
+    wide, unit = source.constant("polygons/polygons.h", "TL_POLYGON_LIMIT"), source.finest()
     need(2 * narrow <= 2**25 and 2 * (2 * narrow) ** 2 <= 2**53, "a difference of products is not exact")
     need(unit * 2 * narrow + (2 * narrow) ** 2 < 2**63, "a piece leaves 64 bits")
     need(unit * 2 * wide + (2 * wide) ** 2 < 2**127 and 2 * (2 * wide) ** 2 < 2**127, "a piece leaves 128 bits")
@@ -276,7 +276,22 @@ def windows(source: Source) -> None:
     need(2**near <= 2**30 and 2 * (2**30 - 1) < 2**31, "a column from the window does not fit 32 bits")
     (cells,) = source.numbers("src/topleft/_core/raster/sampling.py", r"MAX_CELLS = 1 << (\d+)")
     need(2**cells + 2**24 < 2**31, "a place of a cell does not fit 32 bits")
-    need(2**62 + 2**62 <= 2**63, "work below 0 may overflow")
+    source.says("topleft.h", "n_px <= 2^62", "window->pause->left_px >= 0)")
+    need(0 - 2**62 >= -(2**63), "work that is left overflows")
+
+
+@claim("range", "ids", "src/topleft/_core/base/arrays.py", "triangles must have at most {INT32_MAX} rows")
+def ids(source: Source) -> None:
+    """Indices, names and strides of up to 2^31 rows: rows are found by 64 bits, and names of scenes fit int32."""
+    source.says(
+        "src/topleft/_core/base/arrays.py", "INT32_MAX = 2**31 - 1", "vertices must have at most {INT32_MAX} rows"
+    )
+    source.says("src/topleft/_meshes/scene/scene.py", "if self.n_triangles > INT32_MAX")
+    source.says("lanes/lanes_x86.h", "uint64_t at = (uint32_t)i[4 * step * k]", "base + at * (uint64_t)scale")
+    source.says("vertex/corners.h", "read_corners(const tl_snapped *snapped, int64_t i,")
+    need(2**32 * 32 * 4 < 2**63, "a row of 32 bytes, or of four such, is not found by 64 bits")
+    source.says("src/topleft/_meshes/model/normals.py", "n_triangles >= 1 << 28")
+    need(3 * 2**28 < 2**31, "corners round vertices do not fit int32")
 
 
 @claim(
@@ -331,4 +346,4 @@ def snap(source: Source) -> None:
     source.says("vertex/fixed.h", "fabs(x_fx) < TL_NARROW_LIMIT", "fabs(x_fx) < TL_WIDE_LIMIT")
     need(narrow == 2**30 and wide == 2**62, "other limits")
     (integers,) = source.numbers("exact/take_points.c", r"\(double\)integers\[i\]\) < (\S+)\)")
-    need(integers * 2**16 <= wide and integers <= 2**53, "an integer on a grid is not exact")
+    need(integers * source.finest() <= wide and integers <= 2**53, "an integer on a grid is not exact")

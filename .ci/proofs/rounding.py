@@ -266,7 +266,11 @@ def areas(source: Source) -> None:
     """The area right of an edge in a pixel is off by less than 0.501 units, three edges by less than 9e-8."""
     u, whole = DOUBLE, 2 ** int(source.constant("area/ramp.c", "TL_AREA_BITS"))
     longest = Fraction(2 ** int(source.constant("area/area.c", "TL_MAX_EDGE_BITS")))
-    for across in (Fraction(1, 2**16), Fraction(1), longest):  # px, of an edge that may be the longest downwards
+    for across in (
+        Fraction(1, source.finest()),
+        Fraction(1),
+        longest,
+    ):  # px, of an edge that may be the longest downwards
         off = 3 * u * (1 + u) * (across + 1)  # of x
         steep = whole * longest / (2 * across)
         # By the slopes of Q: `whole` of `low`; 0 of `high`, for 2 steep (high - low) is the height; and by squares.

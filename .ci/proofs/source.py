@@ -70,6 +70,11 @@ class Source:
         value, _, shift = line[1].removeprefix("(int64_t)").partition(" << ")  # type: ignore[index]
         return number_of(value) * (1 << int(shift or 0))
 
+    def finest(self) -> int:
+        """Sub-pixels of a pixel, at most."""
+        (bits,) = self.numbers("src/topleft/_core/base/arrays.py", r"subpixel_bits must be in 0\.\.(\d+)")
+        return 1 << int(bits)
+
     def run(self, *arguments: object, program: str) -> None:
         """Compile a program of .ci/proofs with the code, and run it."""
         has_avx2 = " avx2 " in Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else False
