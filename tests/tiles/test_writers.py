@@ -143,6 +143,31 @@ def test_url_that_cannot_be_written_to_is_told():
         raster_of("labels").to_zarr("data://x.zarr")
 
 
+def test_store_that_refuses_once_is_named_and_resumed(monkeypatch):
+    fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
+    store = type(fsspec.filesystem("memory"))
+    raster, put = raster_of("labels"), store.pipe_file
+    whole = "memory://bucket/whole.zarr"
+    raster.to_zarr(whole, levels=2)
+    names = store().find("/bucket/whole.zarr")
+    for n_before in range(0, len(names), 5):
+        refused = itertools.count(-n_before)
+
+        def refuse(self, path, value, refused=refused, **options):
+            if next(refused) == 0:
+                raise PermissionError(13, "denied")
+            return put(self, path, value, **options)
+
+        url = f"memory://bucket/refused{n_before}.zarr"
+        monkeypatch.setattr(store, "pipe_file", refuse)
+        with pytest.raises(PermissionError, match=rf"cannot write to {url}/.*: denied"):
+            raster.to_zarr(url, levels=2)
+        monkeypatch.undo()
+        raster.to_zarr(url, levels=2, resume=True)
+        for name in names:
+            assert store().cat_file(name) == store().cat_file(name.replace("whole", f"refused{n_before}"))
+
+
 # GeoTIFF
 
 

@@ -159,6 +159,9 @@ class RemotePath:
             self._send(fs, name, content)
         except (NotImplementedError, ValueError) as error:  # fsspec only reads that kind of URL
             raise ValueError(f"cannot write to {self.url}: {error}") from None
+        except OSError as error:
+            told = f"cannot write to {self.url}: {error.strerror or error}"
+            raise (OSError(told) if error.errno is None else OSError(error.errno, told)) from error
 
     def _send(self, fs: Any, name: str, content: bytes) -> None:
         protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
