@@ -52,6 +52,23 @@ def test_shift_by_whole_pixels_with_the_window_keeps_every_buffer(make):
         assert_same_buffers(buffers(replace(scene, vertices=there, view=view)), buffers(replace(scene, vertices=here)))
 
 
+@pytest.mark.parametrize("far", [2**29 - 40, 2**30, 2**31 - 40, 2**40])
+@pytest.mark.parametrize("sampling", ["center", "msaa4"])
+def test_shift_beyond_the_pixels_that_int32_counts_keeps_coverage_and_colors(far, sampling):
+    rng = np.random.default_rng(far)
+    here, triangles = rng.integers(-640, 4736, (60, 2)) / 64, np.arange(60).reshape(-1, 3)
+    colors = rng.integers(0, 256, (20, 4), np.uint8)
+    view = {"sampling": sampling, "threads": 3}
+    there = view | {"origin": (far, -far)}
+    assert_same(
+        tl.coverage(here + (far, -far), triangles, (64, 64), **there), tl.coverage(here, triangles, (64, 64), **view)
+    )
+    assert_same(
+        tl.fill(here + (far, -far), triangles, colors, (64, 64), **there),
+        tl.fill(here, triangles, colors, (64, 64), **view),
+    )
+
+
 # ---- windows --------------------------------------------------------------------------------------------------------
 
 
