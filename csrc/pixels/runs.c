@@ -3,9 +3,9 @@
  * a permutation.
  *
  * The weight of corner k at a pixel is E_k * q_k, its edge function times 1/w: a value is sum(E_k q_k a_k) / sum(E_k
- * q_k).  E_k is an exact integer, rounded once to float32; no result depends on where a run, a window or a thread
- * begins.  Edge functions are positive where the front is visible.  So the sum of the normals of the corners points to
- * the viewer, whichever side is visible.
+ * q_k).  E_k is an exact integer, rounded once to float32, so a value errs by less than 13.01 * 2^-24 of the largest
+ * a_k; no result depends on where a run, a window or a thread begins.  Edge functions are positive where the front is
+ * visible.  So the sum of the normals of the corners points to the viewer, whichever side is visible.
  *
  * Based on: C. A. Burns and W. A. Hunt, The Visibility Buffer, 2013; J. F. Blinn, Hyperbolic Interpolation, 1992; M.
  * Olano and T. Greer, Triangle Scan Conversion using 2D Homogeneous Coordinates, 1997 (clipped triangles). */

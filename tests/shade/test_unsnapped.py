@@ -80,7 +80,7 @@ def test_unsnapped_normals_are_mixed_by_the_weights_of_fractions(isa, kind):
         corners = points[mesh.triangles[frags.triangle[y, x]]]
         box = np.prod(np.ptp(corners, axis=0)) / abs(np.linalg.det(np.diff(corners, axis=0)))
         for mine, weight in zip(got, exact_weights(corners, x, y), strict=True):
-            # a weight errs by 2**-24 of itself, 2**-44, and what float64 has lost; normals by 2**-22 of it
+            # a weight errs by 2**-24 of itself, 2**-43, and at most 2**-48 boxes over areas; normals by 2**-22 of it
             assert abs(mine - weight) <= 2.0**-21 * weight + 2.0**-43 + 2.0**-49 * box
 
 
