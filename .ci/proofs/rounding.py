@@ -332,6 +332,18 @@ def power_of_two(number: Fraction) -> Fraction:
     return Fraction(2) ** math.ceil(math.log2(number))
 
 
+@claim("rounding", "attributes", "pixels/runs.c", "so a value errs by less than 13.01 * 2^-24 of the largest")
+def attributes(source: Source) -> None:
+    """sum(E q a) / sum(E q) in float32, of positive E and q: E, q and q a are rounded, then products and sums."""
+    sums = "vf_fma(p->e[0], pick(p, c0), vf_fma(p->e[1], pick(p, c1), vf_mul(p->e[2], pick(p, c2))))"
+    source.says("pixels/runs.c", sums)
+    source.says("shade/shade_pixels.c", "p->inv_q = vf_div(vf_set1(1.0f), p->q)", "p->inv_q);")
+    above = (1 + FLOAT) ** (1 + 1 + 1 + 3)  # of E, q, q a; and a product and two sums
+    below = (1 - FLOAT) ** (1 + 1 + 3)
+    error = above / below * (1 + FLOAT) ** 2 - 1  # the inverse, and the product with it
+    need(error < Fraction(1301, 100) * FLOAT, f"a value errs by {float(error / FLOAT):.3f} units of 2^-24")
+
+
 @claim("rounding", "spans", "tiles/spans.c", "its error is below 2^-49 of the largest coordinate")
 def spans(source: Source) -> None:
     """The point where an edge enters a row of windows, and the window of a column."""
@@ -435,6 +447,10 @@ def depth(source: Source) -> None:
     need(error <= 25 * u, f"a depth errs by {float(error / u):.2f} u r")
     sums = 2 * u * (1 + u)  # of the largest |z|
     need(2 * error * slivers + sums <= Fraction(1, 2**35), "a depth errs by more than 2^-35 of the largest |z|")
+    # Slivers: z0 + (w1 (d1 / W) + w2 (d2 / W)) of rounded integers w1, w2 and W, of w1 + w2 <= W and |d| <= 2 |z|.
+    source.says("sink/sink.c", "slope1 = (t->z[1] - z0) / t->w_sum", "z0 + (w1[k] * slope1 + w2[k] * slope2)")
+    weighted = 2 * ((1 + u) ** 6 / (1 - u) - 1)
+    need(weighted + u * (1 + weighted) <= Fraction(1, 2**35), "a depth of a sliver errs by more than 2^-35")
 
 
 @claim("rounding", "weights", "pixels/weights_exact.c", "weights within 2^-36")
