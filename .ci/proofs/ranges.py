@@ -263,7 +263,6 @@ def rings(source: Source) -> None:
         "vd_ge(vd_set1(0x1p50), vd_abs(fx))",
         "far = (int64_t)1 << (50 - grid_bits)",
     )
-    need(2**52 <= 3 * 2**51 - 2**50 and 3 * 2**51 + 2**50 <= 2**53, "the snap rounds to more than an integer")
     need(2**50 + narrow < 2**53, "a coordinate from the corner is not exact")
 
 
@@ -336,6 +335,23 @@ def positions_of(source: Source) -> dict[int, tuple[tuple[int, int], ...]]:
         if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "POSITIONS" and node.value:
             return ast.literal_eval(node.value)
     raise NotProvedError("sampling.py has no positions")
+
+
+@claim("range", "shifts", "lanes/lanes.h", "a number below 2^42 less the nearest multiple of 2^-8")
+def shifts(source: Source) -> None:
+    """Numbers that are rounded by adding a large one: the sum lies where float64 has steps of the unit."""
+    source.says("raster/triangles_float.c", "vd_ge(vd_set1(0x1p30), farthest)", "vd_off_256th(t->x[k])")
+    block, step = (source.constant("pixels/runs.c", f"TL_{name}") for name in ("RUN_BLOCK", "MOST_STEP"))
+    area = source.constant("pixels/runs.c", "TL_UNIT_AREA")
+    for name, pattern, most, unit in (
+        ("lanes/lanes.h", r"shift = vd_set1\((\S+?)\)", Fraction(2**42), Fraction(1, 2**8)),
+        ("lanes/lanes_scalar.h", r"\(\(a \+ (\S+)\) - 0x1\.8p52\)", Fraction(2**51), Fraction(1)),
+        ("raster/single_float.c", r"magic = (\S+);", Fraction(2**31), Fraction(1)),
+        ("pixels/runs.c", r"integers = vd_set1\((\S+?)\)", area + block * step, Fraction(1)),  # near a pixel inside
+        ("polygons/points.c", r"magic = vd_set1\((\S+?)\)", Fraction(2**50), Fraction(1)),
+    ):
+        (shift,) = source.numbers(name, pattern)
+        need(2**52 * unit <= shift - most and shift + most <= 2**53 * unit, f"{name} rounds to another unit")
 
 
 @claim("range", "snap", "vertex/snap.c", "rint is the only rounding")

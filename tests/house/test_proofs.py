@@ -36,6 +36,7 @@ PLANTED = {
     "larger boxes on the grid": ("grid-edges", "raster/triangles_float.c", "BOX 64.0f", "BOX 256.0f"),
     "smaller numbers in sums": ("expansions", "exact/sign.c", ">= 0x1p-440", ">= 0x1p-540"),
     "fewer words": ("comparisons", "exact/sign.c", "TL_BIG_WORDS 68", "TL_BIG_WORDS 64"),
+    "a larger shift": ("shifts", "lanes/lanes.h", "vd_set1(0x1.8p44)", "vd_set1(0x1.8p45)"),
     "finer sub-pixels": ("wide-edges", "src/topleft/_core/base/arrays.py", "must be in 0..16", "must be in 0..18"),
     "larger points": ("clouds", "src/topleft/_core/raster/points.py", "1 << 14", "1 << 15"),
     "larger polygons": ("rings", "polygons/polygons.h", "(1 << 24)", "(1 << 27)"),
