@@ -1,12 +1,8 @@
 """Checks what comments claim of rounding, ranges and owners: `prove.py [--all] [--root FOLDER] [NAME ...]`.
 
 Constants are read from the code, and programs include it, so a change there changes the proof. Each claim names a
-sentence of a comment, which must stand there. `--all` adds the claims that take minutes. Needs gcc and z3-solver.
-docs/design/proofs.md lists the claims.
-
-Methods. Values: every case is computed by the code of csrc, and compared. Rounding: the largest error of each result
-follows from those of its arguments, in fractions (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2002,
-chapter 3). Range: bounds in integers. Logic: z3 finds no counterexample among all integers.
+sentence of a comment, which must stand there. `--all` adds the claims that take minutes. Needs gcc, NumPy, z3-solver.
+docs/design/proofs.md lists the claims and the methods; each method has a file in .ci/proofs.
 """
 
 from __future__ import annotations

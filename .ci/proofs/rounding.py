@@ -1,4 +1,7 @@
-"""Rounding: the largest error of each result follows from those of its arguments, in fractions."""
+"""Rounding: the largest error of each result follows from those of its arguments, in fractions.
+
+Based on: N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2002, chapter 3.
+"""
 
 from __future__ import annotations
 
