@@ -63,13 +63,13 @@ def test_labels_go_to_a_zarr_with_levels(tmp_path, pair):
     out = tmp_path / "labels.zarr"
     arguments = ["--labels", "--size", "64x48", "--levels", "2", "--window", "32", "--uncompressed", "--quiet"]
     assert main(["raster", pair, "-o", str(out), *arguments]) == 0
-    said = json.loads((out / "0/zarr.json").read_text())
+    said = json.loads((out / "labels/zarr.json").read_text())
     assert (said["shape"], said["data_type"]) == ([48, 64], "int32")
     grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
     points = np.column_stack([grid.to_pixels(POINTS), POINTS[:, 2]])
     whole = tl.rasterize(points, TRIANGLES, (64, 48)).triangle
-    assert np.array_equal(chunk_of(out / "0/c/0/1", "<i4", (32, 32)), whole[:32, 32:])
-    assert np.array_equal(chunk_of(out / "1/c/0/0", "<i4", (32, 32))[:24], whole[::2, ::2])
+    assert np.array_equal(chunk_of(out / "labels/c/0/1", "<i4", (32, 32)), whole[:32, 32:])
+    assert np.array_equal(chunk_of(out / "1/labels/c/0/0", "<i4", (32, 32))[:24], whole[::2, ::2])
 
 
 @pytest.mark.parametrize("bits", [0, "exact"])
@@ -80,7 +80,7 @@ def test_subpixel_bits_reach_the_raster(tmp_path, pair, bits):
     grid = tl.Grid.around((POINTS, TRIANGLES), size=(64, 48))
     points = np.column_stack([grid.to_pixels(POINTS), POINTS[:, 2]])
     whole = tl.rasterize(points, TRIANGLES, (64, 48), subpixel_bits=bits).triangle
-    assert np.array_equal(chunk_of(out / "c/0/0", "<i4", (48, 64)), whole)
+    assert np.array_equal(chunk_of(out / "labels/c/0/0", "<i4", (48, 64)), whole)
 
 
 def test_values_come_from_a_file_or_by_name(tmp_path):
@@ -94,7 +94,16 @@ def test_values_come_from_a_file_or_by_name(tmp_path):
         out = tmp_path / f"{i}.zarr"
         arguments = ["--pixel-size", "2", "--values", name, "--nodata", "-1", "--uncompressed", "--quiet"]
         assert main(["raster", mesh, "-o", str(out), *arguments]) == 0
-        assert np.array_equal(chunk_of(out / "c/0/0", whole.dtype, (h, w)), whole)
+        assert np.array_equal(chunk_of(out / "field/c/0/0", whole.dtype, (h, w)), whole)
+
+
+def test_crs_goes_to_zarr(tmp_path, pair):
+    out = tmp_path / "a.zarr"
+    assert main(["raster", pair, "-o", str(out), "--pixel-size", "1", "--crs", "EPSG:25832", "--quiet"]) == 0
+    said = json.loads((out / "spatial_ref/zarr.json").read_text())["attributes"]
+    assert said["spatial_ref"] == "EPSG:25832"
+    x = np.frombuffer((out / "x/c/0").read_bytes())
+    assert np.array_equal(x, tl.Grid.around((POINTS, TRIANGLES), pixel_size=1.0).x_centers)
 
 
 def test_masks_go_to_deep_zoom(tmp_path, pair):
@@ -125,7 +134,7 @@ def test_interrupted_command_resumes(tmp_path, pair, capsys):
     out, arguments = tmp_path / "a.zarr", ["--size", "64x48", "--window", "16", "--labels"]
     assert main(["raster", pair, "-o", str(out), *arguments]) == 0
     capsys.readouterr()
-    (out / "c/1/2").unlink()
+    (out / "labels/c/1/2").unlink()
     assert main(["raster", pair, "-o", str(out), *arguments, "--resume", "--threads", "1"]) == 0
     assert " 1 windows drawn, " in capsys.readouterr().out
     assert main(["raster", pair, "-o", str(out), *arguments]) == 2
@@ -149,7 +158,7 @@ def test_command_replaces_what_is_there_when_told_to(tmp_path, pair, capsys, nam
         (["-o", "a.png", "--size", "9x9"], "the name must end in one of .tif .tiff .zarr .dzi"),
         (["-o", "a.zarr"], "either --pixel-size or --size must say how large the raster is"),
         (["-o", "a.zarr", "--size", "9x9", "--pixel-size", "1"], "either --pixel-size or --size"),
-        (["-o", "a.zarr", "--size", "9x9", "--crs", "EPSG:25832"], "--crs is for .tif"),
+        (["-o", "a.dzi", "--size", "9x9", "--crs", "EPSG:25832"], "--crs is for .tif and .zarr, got a.dzi"),
         (["-o", "a.tif", "--size", "9x9", "--levels", "2"], "--levels is for .zarr"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--kind", "depth"], "give one of them"),
         (["-o", "a.zarr", "--size", "9x9", "--labels", "--nodata", "5"], "nodata must be no label, got 5"),

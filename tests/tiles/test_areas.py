@@ -115,7 +115,7 @@ def test_geotiff_of_polygons_says_where_it_lies_and_resumes(tmp_path):
 def test_zarr_of_polygons_is_the_raster(tmp_path):
     zarr = pytest.importorskip("zarr")
     tl.tiles(PARCELS, GRID, window=32).to_zarr(tmp_path / "a.zarr")
-    assert np.array_equal(zarr.open(tmp_path / "a.zarr")[:], tl.polygons(PARCELS, GRID, values="index"))
+    assert np.array_equal(zarr.open(tmp_path / "a.zarr")["labels"][:], tl.polygons(PARCELS, GRID, values="index"))
 
 
 @pytest.mark.parametrize(

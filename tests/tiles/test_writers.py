@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +63,7 @@ def test_zarr_is_the_raster(tmp_path, kind, chunk):
     zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
     raster = raster_of(kind)
     raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
-    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")
     assert (found.shape, found.dtype) == (raster.shape, raster.dtype)
     assert equal(found[:], raster[:])
 
@@ -72,7 +73,7 @@ def test_zarr_of_one_window_has_chunks_of_any_size(tmp_path, chunk):
     zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
     raster = raster_of("labels", window=2048)
     raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
-    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")
     assert found.chunks == (chunk, chunk)
     assert equal(found[:], raster[:])
 
@@ -82,16 +83,16 @@ def test_zarr_is_compressed_as_asked(tmp_path, compression):
     zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
     raster = raster_of("labels")
     raster.to_zarr(tmp_path / "a.zarr", compression=compression)
-    assert equal(zarr.open_array(tmp_path / "a.zarr", mode="r")[:], raster[:])
+    assert equal(zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")[:], raster[:])
 
 
 def test_zarr_chunks_can_be_read_without_a_package(tmp_path):
     raster = raster_of("labels")
     written = raster.to_zarr(tmp_path / "a.zarr", compression="none")
     assert (written.n_drawn, written.n_kept, written.n_blank) == (19, 0, 1)
-    said = json.loads((tmp_path / "a.zarr/zarr.json").read_text())
+    said = json.loads((tmp_path / "a.zarr/labels/zarr.json").read_text())
     assert (said["shape"], said["fill_value"], said["dimension_names"]) == ([200, 300], -1, ["y", "x"])
-    chunk = np.frombuffer((tmp_path / "a.zarr/c/1/2").read_bytes(), "<i4").reshape(64, 64)
+    chunk = np.frombuffer((tmp_path / "a.zarr/labels/c/1/2").read_bytes(), "<i4").reshape(64, 64)
     assert equal(chunk, raster[64:128, 128:192])
 
 
@@ -101,11 +102,39 @@ def test_zarr_levels_are_halves(tmp_path):
         raster = raster_of(kind, window)
         raster.to_zarr(tmp_path / kind, levels=3)
         group = zarr.open_group(tmp_path / kind, mode="r")
-        assert group.attrs["ome"]["multiscales"][0]["datasets"][2]["path"] == "2"
+        assert group.attrs["ome"]["multiscales"][0]["datasets"][2]["path"] == f"2/{raster.kind}"
         level = raster[:]
         for i in range(3):
-            assert equal(group[str(i)][:], level), (kind, i)
+            assert equal(group[f"{i}/{raster.kind}" if i else raster.kind][:], level), (kind, i)
             level = halved(level, raster.painter.nodata, is_mean=raster.has_means)
+
+
+@pytest.mark.parametrize("levels", [1, 3])
+@pytest.mark.parametrize("grid", [GRID, tl.Grid((300, 200), GRID.extent, "down")])
+def test_zarr_opens_in_xarray_with_coordinates_and_crs(tmp_path, levels, grid):
+    pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    xarray = pytest.importorskip("xarray", reason="the tiles extra is not installed")
+    raster = tl.tiles((POINTS, TRIANGLES), replace(grid, crs="EPSG:25832"), window=64, **KINDS["field"])
+    raster.to_zarr(tmp_path / "a.zarr", levels=levels)
+    found = xarray.open_zarr(tmp_path / "a.zarr")
+    assert equal(found["field"].values, raster[:])
+    assert tl.Grid.like(found["field"]) == replace(raster.grid, nodata=-9999.0)
+    for level in range(1, levels):
+        half = xarray.open_zarr(tmp_path / "a.zarr", group=str(level))
+        assert half["field"].shape == (200 >> level, 300 >> level)
+        x, y = (found[name].values.reshape(-1, 2**level).mean(axis=1) for name in "xy")
+        assert np.array_equal(half["x"], x)
+        assert np.array_equal(half["y"], y)
+
+
+def test_zarr_in_pixels_opens_in_xarray(tmp_path):
+    xarray = pytest.importorskip("xarray", reason="the tiles extra is not installed")
+    pytest.importorskip("zarr", reason="the tiles extra is not installed")
+    raster = tl.tiles((POINTS - [500000, 5000000, 0], TRIANGLES), (300, 200), window=64)
+    raster.to_zarr(tmp_path / "a.zarr")
+    found = xarray.open_zarr(tmp_path / "a.zarr")
+    assert (list(found.data_vars), list(found.coords)) == (["labels"], [])
+    assert equal(found["labels"].values, raster[:])
 
 
 @pytest.mark.parametrize("window", [(100, 50), 64, 300])
@@ -132,7 +161,7 @@ def test_zarr_goes_to_what_fsspec_reaches():
     fsspec = pytest.importorskip("fsspec", reason="the tiles extra is not installed")
     raster = raster_of("labels")
     assert raster.to_zarr("memory://bucket/a.zarr", compression="none").n_drawn == 19
-    stored = fsspec.filesystem("memory").cat_file("/bucket/a.zarr/c/0/1")
+    stored = fsspec.filesystem("memory").cat_file("/bucket/a.zarr/labels/c/0/1")
     assert equal(np.frombuffer(stored, "<i4").reshape(64, 64), raster[:64, 64:128])
     assert raster.to_zarr("memory://bucket/a.zarr", compression="none", resume=True).n_kept == 19
 
@@ -430,7 +459,7 @@ def test_lock_holds_between_processes_and_ends_with_a_killed_one(tmp_path):
 @pytest.mark.parametrize("name", WRITERS)
 def test_part_that_has_gone_is_told(tmp_path, name):
     """A blank part would be a lie."""
-    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+    place = {"a.zarr": "a.zarr/labels/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
 
     def clean(step):
         if step.n_done == step.n_blocks:
@@ -570,7 +599,7 @@ def test_outside_is_the_no_data_of_the_file_in_each_writer(tmp_path, kind):
         assert equal(found.read(1), wished)
     changed = raster.with_nodata(nodata)
     changed.to_zarr(tmp_path / "a.zarr")
-    found = zarr.open_array(tmp_path / "a.zarr", mode="r")
+    found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")
     assert found.fill_value == np.asarray(nodata, raster.dtype)
     assert equal(found[:], wished)
     assert equal(changed[:], wished)
@@ -634,7 +663,7 @@ def test_damaged_tile_is_written_again(tmp_path, name, damage):
     for folder in ("whole", "cut"):
         (tmp_path / folder).mkdir()
     WRITERS[name](raster_of("labels"), tmp_path / "whole" / name)
-    where = {"a.zarr": "a.zarr/{}/c", "a.tif": "a.tif.parts/{}", "a.dzi": "a_files/{}"}[name]
+    where = {"a.zarr": "a.zarr/{}/labels/c", "a.tif": "a.tif.parts/{}", "a.dzi": "a_files/{}"}[name]
 
     def stop(step):
         if step.n_done > 20:  # the 19 windows, and two of the next level
@@ -643,7 +672,11 @@ def test_damaged_tile_is_written_again(tmp_path, name, damage):
     with pytest.raises(KeyboardInterrupt):
         WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, progress=stop)
     for level in (9, 8) if name == "a.dzi" else (0, 1):
-        tiles = [path for path in (tmp_path / "cut" / where.format(level)).rglob("*") if path.is_file()]
+        tiles = [
+            path
+            for path in (tmp_path / "cut" / where.format(level).replace("zarr/0/", "zarr/")).rglob("*")
+            if path.is_file()
+        ]
         tile = max(tiles, key=lambda path: path.stat().st_size)
         tile.write_bytes(DAMAGES[damage](tile.read_bytes()))
     written = WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, resume=True)
@@ -653,7 +686,7 @@ def test_damaged_tile_is_written_again(tmp_path, name, damage):
 
 @pytest.mark.parametrize("name", WRITERS)
 def test_tile_that_is_damaged_meanwhile_is_told(tmp_path, name):
-    place = {"a.zarr": "a.zarr/0/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+    place = {"a.zarr": "a.zarr/labels/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
 
     def harm(step):
         if step.n_done == 19:
@@ -691,7 +724,7 @@ def test_killed_run_goes_on_and_draws_no_whole_window_twice(tmp_path, kind):
         return subprocess.Popen(command, env=CHILD, stdout=subprocess.PIPE, text=True)
 
     def whole_windows(path):
-        folder = path / "0/c" if kind == "zarr" else path.with_name(path.name + ".parts") / "0"
+        folder = path / "labels/c" if kind == "zarr" else path.with_name(path.name + ".parts") / "0"
         names = [p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file() and p.name[0] != "."]
         n = 1 if kind == "zarr" else 2  # tiles along the side of a window
         tiles = Counter(tuple(int(i) // n for i in name.replace("_", "/").split("/")) for name in names)

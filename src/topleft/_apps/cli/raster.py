@@ -25,7 +25,7 @@ from topleft._apps.cli.render import client_of
 from topleft._apps.cli.report import complain, complaining
 from topleft._apps.tiles.tiles import Tiles, tiles
 from topleft._core.base.georeference import is_same_crs, transformed
-from topleft._core.base.grid import grid_around
+from topleft._core.base.grid import ExtentLike, Grid, grid_around
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.threads import available_threads
 from topleft.annex.files import has_polygons, load_polygons
@@ -67,8 +67,8 @@ def run_raster(options: argparse.Namespace) -> int:
     is_tiff, is_zarr = path.suffix.lower() in (".tif", ".tiff"), path.suffix.lower() == ".zarr"
     if isinstance(path, RemotePath) and not is_zarr:
         raise UsageError(f"-o {options.out}: {path.suffix} goes to a path of this machine, .zarr to a URL as well")
-    if options.crs is not None and not is_tiff:
-        raise UsageError(f"--crs is for .tif, got {path.name}")
+    if options.crs is not None and not (is_tiff or is_zarr):
+        raise UsageError(f"--crs is for .tif and .zarr, got {path.name}")
     if options.levels is not None and not is_zarr:
         raise UsageError(f"--levels is for .zarr, got {path.name}")
     if options.uncompressed and not (is_tiff or is_zarr):
@@ -110,7 +110,7 @@ def write(raster: Tiles, path: Location, options: argparse.Namespace, client: An
     assert isinstance(path, Path)
     if suffix == ".dzi":
         return raster.to_deepzoom(path, **how)
-    return raster.to_geotiff(path, crs=options.crs, compression=compression(options, "deflate"), **how)
+    return raster.to_geotiff(path, compression=compression(options, "deflate"), **how)
 
 
 def compression(options: argparse.Namespace, usual: str) -> Any:
@@ -133,8 +133,7 @@ def raster_of_polygons(options: argparse.Namespace) -> Tiles:
     subject, crs = picture.polygons, options.crs or picture.crs
     if picture.crs is not None and crs is not None and not is_same_crs(picture.crs, crs):
         subject = replace(subject, points=transformed(subject.points, picture.crs, crs))
-    step = options.pixel_size if options.pixel_size is None or len(options.pixel_size) > 1 else options.pixel_size[0]
-    grid = grid_around(options.extent or extent_of(subject), options.size, step, "up")
+    grid = _grid(options, extent_of(subject))
     kind: Any = "coverage"
     if options.kind != "coverage" or options.values is not None:
         tell_of_background(picture, numbers, nodata, options.mesh)
@@ -167,19 +166,22 @@ def raster_of(options: argparse.Namespace) -> Tiles:
         more["subpixel_bits"] = options.subpixel_bits
     if kind == "field" and options.nodata is not None:
         more["nodata"] = options.nodata
-    step = options.pixel_size
     return tiles(
         triangles,
-        options.size,
+        _grid(options, extent_of(triangles)),
         kind=kind,
         values=values,
         window=options.window,
-        extent=options.extent or extent_of(triangles),
-        pixel_size=step if step is None or len(step) > 1 else step[0],
         threads=options.threads,
         folder=options.folder,
         **more,
     )
+
+
+def _grid(options: argparse.Namespace, box: ExtentLike) -> Grid:
+    """The grid of the options, which covers a box unless they say another window."""
+    step = options.pixel_size if options.pixel_size is None or len(options.pixel_size) > 1 else options.pixel_size[0]
+    return replace(grid_around(options.extent or box, options.size, step, "up"), crs=options.crs)
 
 
 def add_raster_command(commands: Any) -> None:

@@ -15,16 +15,20 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, get_args
 
 from topleft._core.base.arrays import shown
 from topleft._core.base.remote import Location, RemotePath, as_location
 from topleft._core.base.whole_file import is_whole, write_whole
+from topleft.typing import RasterKindOption
 
 MANIFEST = "topleft.txt"
 """The chunk that marks a folder as written by topleft."""
 
-OWN_NAME = re.compile(rf"{re.escape(MANIFEST)}|\d+/\d+_\d+(\.png)?|(\d+/)?(zarr\.json|c/\d+/\d+(/0)*)")
+ZARR_ARRAYS = "|".join((*get_args(RasterKindOption), "x", "y", "spatial_ref"))
+OWN_NAME = re.compile(
+    rf"{re.escape(MANIFEST)}|\d+/\d+_\d+(\.png)?|(\d+/)?(({ZARR_ARRAYS})/)?(zarr\.json|c/\d+(/\d+(/0)*)?)"
+)
 """The names of chunks: of parts of a TIFF, of Deep Zoom, of Zarr."""
 
 PART = re.compile(r"\.(.+)\.[0-9a-f]{8}\.part")

@@ -186,7 +186,10 @@ class Tiles(WindowedRaster):
         executor: Any = None,
         storage: dict[str, Any] | None = None,
     ) -> Written:
-        """Write the raster as a Zarr array (version 3), or as a group of levels; return the numbers of windows.
+        """Write the raster as Zarr (version 3), which `xarray.open_zarr` opens; return the numbers of windows.
+
+        The array has the name of the kind, ``zarr.open(path)["labels"]``, and a raster on a grid has the coordinates
+        "x" and "y" beside it and the CRS in "spatial_ref", as rioxarray reads it.
 
         Parameters
         ----------
@@ -198,8 +201,8 @@ class Tiles(WindowedRaster):
         compression : {"gzip", "zstd", "none"}
             How chunks are stored; "zstd" needs numcodecs, which comes with zarr.
         levels : int
-            How many resolutions, each half of the one before: from 2 on a group in the manner of OME-Zarr 0.5, with the
-            arrays "0", "1", ...
+            How many resolutions, each half of the one before: coarser ones are the groups "1", "2", ..., which
+            `xarray.open_zarr` opens by ``group="1"``; from 2 on they are listed in the manner of OME-Zarr 0.5.
         resume : bool
             Continue an interrupted run: whole windows are kept; one with a tile that is missing, or on a disk cannot be
             read, is drawn again.
