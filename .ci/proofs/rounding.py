@@ -347,6 +347,23 @@ def attributes(source: Source) -> None:
     need(error < Fraction(1301, 100) * FLOAT, f"a value errs by {float(error / FLOAT):.3f} units of 2^-24")
 
 
+@claim("rounding", "layers", "pixels/composite.c", "a colour of uint8 is within 1/2 + 2^-37 of the exact mean")
+def layers(source: Source) -> None:
+    """The mean of up to 17 colours by weights a T, where T is the product of 1 - a of the layers before.
+
+    An error u a of a moves T by at most u times a weight before, so all of them by u times the sum of weights; the
+    rest is relative: 1 - a and its product with T, for each layer before.
+    """
+    name, u = "pixels/composite.c", DOUBLE
+    source.says(name, "own = (double)color[n_colors] / ONE, share = own * *through", "*through *= 1.0 - own")
+    n = int(source.constant("topleft.h", "TL_MAX_LAYERS")) + 1  # and the background
+    weights = (1 + u) ** (2 * (n - 1) + 2) - 1 + n * u * (1 + u) ** (4 * n)  # all errors, over the sum of weights
+    above = (1 + weights) * (1 + u) ** (n + 1) - 1  # a product with the colour, and sums
+    below = (1 + weights) * (1 + u) ** n - 1
+    error = 255 * ((above + below) / (1 - below) * (1 + u) + u)
+    need(error < Fraction(1, 2**37), f"a mean errs by 2^{math.log2(error):.2f}")
+
+
 @claim("rounding", "spans", "tiles/spans.c", "its error is below 2^-49 of the largest coordinate")
 def spans(source: Source) -> None:
     """The point where an edge enters a row of windows, and the window of a column."""
