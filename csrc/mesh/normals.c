@@ -5,7 +5,8 @@
  *
  * Triangles are processed by blocks: corners are gathered one by one, normals are computed a vector of triangles at a
  * time, and sums are scattered one by one.  Angles use angle.h, because arctangents of C libraries differ.  All else is
- * sums, products, quotients and roots, each rounded once, in the written order: every machine gives equal bits.
+ * sums, products, quotients and roots, each rounded once, in the written order: every machine gives equal bits.  An
+ * angle is within 2^-48 radians where sides are exact.
  *
  * Based on: G. Thurmer and C. A. Wuthrich, Computing Vertex Normals from Polygonal Facets, Journal of Graphics Tools
  * 3(1), 1998; W. Kahan, Miscalculating Area and Angles of a Needle-like Triangle, 2014. */

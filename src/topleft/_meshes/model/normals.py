@@ -106,8 +106,8 @@ def angle_weighted_normals(vertices: FloatArray, triangles: I32, *, threads: int
     (0, 0, 0) where no face with an area meets the vertex, or where the faces cancel. The weight makes the normal
     independent of how a flat face is cut into triangles, which weights of one a triangle, or of its area, do not
     (G. Thurmer and C. A. Wuthrich, "Computing Vertex Normals from Polygonal Facets", Journal of Graphics Tools 3(1),
-    1998). Angles are within 2**-50 of their value, relative, where the sides are exact in float64; sums are in the
-    order of the faces. Any scale will do: sides are measured by their longest.
+    1998). Angles are within 2**-48 radians where the sides are exact in float64; sums are in the order of the faces.
+    Any scale will do: sides are measured by their longest.
     """
     points, corners = _contiguous(vertices), as_frozen(np.ascontiguousarray(triangles, np.int32))
     source, out = engine.Source(points), np.empty((len(points), 3))
