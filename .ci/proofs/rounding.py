@@ -415,6 +415,28 @@ def angles(source: Source) -> None:
     need(error < Fraction(1, 2**56), f"the polynomial errs by 2^{math.log2(error):.2f}")
 
 
+@claim("rounding", "corner-angles", "mesh/normals.c", "An angle is within 2^-48 radians where sides are exact")
+def corner_angles(source: Source) -> None:
+    """Angles at the two ends of the longest side, from the area and products of sides, and the rest of pi.
+
+    In units of u and of the product of two sides. The area is that of the two shortest sides, so its error is no larger
+    in units of others; a vector that moves by d turns by at most d over its length.
+    """
+    source.says("mesh/normals.c", "vd_sub(vd_mul(u[j], v[l]), vd_mul(u[l], v[j]))", "angle_of(area, pick_widest(widest")
+    source.says("mesh/normals.c", "largest = vd_sub(vd_set1(0x1.921fb54442d18p+1), vd_add(onward, back))")
+    area = math.sqrt(2) + 1 + 2.5  # products, differences, and the root of a sum of three squares
+    product = 3  # of three products, two sums
+    tangent = math.sqrt(2) - 1
+    turn = math.hypot(area, product)
+    # A sum or a difference above and below, and their quotient; six roundings of what is added to q, and q's sum.
+    arctangent = 3 * tangent + 6 * tangent**3 / 3 + tangent
+    start = math.pi / 4 + math.pi / 2  # of a constant, and of the last sum, up to 90 degrees
+    end = turn + arctangent + start + tangent / 8  # the polynomial: 2^-56 of q
+    need(end * 1.001 < 2**4, f"an angle errs by {end:.2f} u")
+    widest = 2 * end + 2 * math.pi / 3 + 2 * math.pi  # their sum, the constant, and the difference
+    need(widest * 1.001 < 2**5, f"the largest angle errs by {widest:.2f} u")
+
+
 @claim("rounding", "logarithms", "pixels/texels.c", "log2 of positive numbers within 1e-10")
 def logarithms(source: Source) -> None:
     """log2 by 2 atanh(t) / ln 2, t from -(3 - sqrt 8) to 3 - sqrt 8, of texels and of gradients."""
