@@ -45,6 +45,8 @@ class StoredPictures:
         __tracebackhide__ = True  # pytest shows the line of the caller
         if not (isinstance(name, str) and re.fullmatch(r"[\w-]+(\.[\w-]+)*", name)):
             raise ValueError(f"name must be letters, digits, '_', '-' and '.', got {shown(name)}")
+        if name.endswith((".got", ".off")):
+            raise ValueError(f"name must not end in .got or .off, the pictures of a difference, got {shown(name)}")
         got = what if isinstance(what, np.ndarray) else render(what, *arguments, **options)
         if isinstance(what, np.ndarray) and (arguments or options):
             raise TypeError("a picture takes no camera, size or options: they are for meshes")
@@ -67,8 +69,11 @@ class StoredPictures:
 
 
 def _read(path: Path) -> NDArray[Any]:
-    with Image.open(path) as image:
-        return np.asarray(image)
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image)
+    except (OSError, SyntaxError, ValueError) as error:  # of Pillow, for files that are damaged
+        raise AssertionError(f"the picture {path} cannot be read: {error}") from error
 
 
 @pytest.fixture

@@ -69,6 +69,20 @@ def test_name_that_leads_elsewhere_is_refused(check, name):
         check(PICTURE, name)
 
 
+@pytest.mark.parametrize("end", ["got", "off"])
+def test_name_of_a_picture_of_a_difference_is_refused(check, end):
+    with pytest.raises(ValueError, match=rf"name must not end in \.got or \.off, .* got 'cube\.{end}'"):
+        check(PICTURE, f"cube.{end}")
+
+
+@pytest.mark.parametrize("content", [b"", b"no picture", "cut"])
+def test_kept_picture_that_is_damaged_is_named(kept, check, content):
+    file = kept / "cube.png"
+    file.write_bytes(file.read_bytes()[:200] if content == "cut" else content)
+    with pytest.raises(AssertionError, match=r"the picture .*cube\.png cannot be read: "):
+        check(PICTURE, "cube")
+
+
 def test_options_of_a_picture_are_refused(check):
     with pytest.raises(TypeError, match="a picture takes no camera, size or options"):
         check(PICTURE, "cube", size=(20, 16))
