@@ -52,7 +52,7 @@ def test_source_is_another_file(square, tmp_path):
         (["-o", "out.xyz"], "the name must end in one of"),
         (["-o", "out.png", "--what", "position"], "positions go to .npy or .tif"),
         (["-o", "out.png", "--what", "color"], "needs a mesh whose vertices have colours"),
-        (["-o", "out.png", "--size", "8"], "must be WIDTHxHEIGHT"),
+        (["-o", "out.png", "--size", "8x"], "must be WIDTHxHEIGHT"),
         (["-o", "out.png", "--gutter", "-3"], "gutter must be a number of texels"),
     ],
 )

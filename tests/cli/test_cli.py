@@ -297,7 +297,7 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
         (["cube", "torus", "-o", "a.png"], "topleft: several meshes need a folder or {name} in OUT, got 'a.png'"),
         (["cube"], "topleft: say where pictures go: -o/--out, --sheet or --animation (try: topleft render --help)"),
         (["-o", "a.png"], "topleft: there is nothing to render: give MESH or --jobs-file (try: topleft render --help)"),
-        (["cube", "-o", "a.png", "--size", "64"], "topleft: argument --size: must be WIDTHxHEIGHT, 1280x720 say, got"),
+        (["cube", "-o", "a.png", "--size", "64x"], "topleft: argument --size: must be WIDTHxHEIGHT, 1280x720 say, or"),
         (["cube", "-o", "a.png", "--size", "0x9"], "topleft: argument --size: must be WIDTHxHEIGHT"),
         (["cube", "-o", "a.png", "--views", "0"], "topleft: argument --views: must be a positive whole number, got"),
         (["cube", "-o", "a.png", "--background", "x"], "topleft: argument --background: must be a colour name or #"),

@@ -1,7 +1,9 @@
 """The command line and batches: what meshes lack of their files is told once, and cameras of files are used."""
 
+import json
 import os
 import warnings
+import zipfile
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 
@@ -46,6 +48,58 @@ def test_render_strict_exits_with_1_after_the_picture(run, lacking):
     assert run("render", "a.obj", "-o", "a.png", "--strict", *SMALL)[0] == 1
     assert (lacking / "a.png").is_file()
     assert run("render", "c.obj", "-o", "c.png", "--strict", *SMALL) == (0, [])
+
+
+def test_render_strict_lets_an_animated_file_stand_at_rest(run, folder, lacking):
+    file = GltfFile(animations=[{"channels": [], "samplers": []}])
+    file.shown(QUAD, [0, 1, 2, 0, 2, 3])
+    (folder / "a.glb").write_bytes(file.glb())
+    said = "topleft: 'a.glb': animations not played: everything is at rest"
+    assert run("render", "a.glb", "-o", "a.png", "--strict", *SMALL) == (0, [said])
+    assert run("render", "a.glb", "a.obj", "-o", "p/", "--strict", *SMALL)[0] == 1
+
+
+@pytest.mark.parametrize("strict", [[], ["--strict"]])
+def test_render_broken_member_of_an_archive_is_exit_1(run, folder, strict):
+    with zipfile.ZipFile(folder / "a.zip", "w") as archive:
+        archive.writestr("whole.obj", OBJ.replace("usemtl m\n", ""))
+        archive.writestr("broken.obj", "v 0 0 0\nf 1 2 3\n")
+    status, (said,) = run("render", "a.zip", "-o", "a.png", *strict, *SMALL)
+    assert status == 1
+    assert said.startswith("topleft: 'a.zip': members of its archive left out: \"broken.obj")
+    assert (folder / "a.png").is_file()
+
+
+@pytest.mark.parametrize("by", ["option", "job file"])
+def test_render_root_lets_meshes_name_files_beside_their_folder(run, folder, by):
+    (folder / "mesh").mkdir()
+    (folder / "mesh/a.obj").write_text("mtllib ../a.mtl\n" + OBJ)
+    (folder / "a.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    (folder / "jobs.toml").write_text('root = "."\n[[job]]\nmesh = "mesh/a.obj"\nout = "b.png"\n')
+    assert len(run("render", "mesh/a.obj", "-o", "a.png", *SMALL)[1]) == 1
+    how = ["mesh/a.obj", "--root", ".", "-o", "b.png"] if by == "option" else ["--jobs-file", "jobs.toml"]
+    assert run("render", *how, *SMALL) == (0, [])
+    assert np.asarray(Image.open("b.png"))[24, 40].tolist() != np.asarray(Image.open("a.png"))[24, 40].tolist()
+
+
+def test_render_distances_are_steps_of_the_depth_scale_and_resume(run, folder):
+    (folder / "mm.obj").write_text("v -50 -50 0\nv 50 -50 0\nv 0 50 0\nf 1 2 3\n")
+    how = ["render", "mm.obj", "-o", "{layer}.png", "--layers", "distance", "--report", "r.json", *SMALL]
+    status, (said,) = run(*how)
+    assert (status, "distance must lie in 0 to 65535 steps of 0.001 for a PNG" in said) == (2, True)
+    assert run(*how, "--depth-scale", "1") == (0, [])
+    assert run("render", "mm.obj", "-o", "{layer}.npy", "--layers", "distance", *SMALL) == (0, [])
+    found, wished = np.asarray(Image.open("distance.png")), np.load("distance.npy")
+    assert np.array_equal(found, np.where(np.isfinite(wished), np.rint(wished), 0))
+    for scale, n_skipped in (("1", 1), ("0.5", 0)):
+        assert run(*how, "--depth-scale", scale, "--resume") == (0, [])
+        assert json.loads((folder / "r.json").read_text())["skipped"] == n_skipped
+    assert np.abs(np.asarray(Image.open("distance.png")) / 2 - found).max() <= 0.5
+
+
+def test_render_size_of_one_number_is_a_square(run, folder):
+    assert run("render", "cube", "-o", "a.png", "--size", "64") == (0, [])
+    assert Image.open("a.png").size == (64, 64)
 
 
 def test_explain_tells_what_a_mesh_lacks(run, lacking):

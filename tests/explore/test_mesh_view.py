@@ -1,6 +1,7 @@
 """Views of a mesh: pixels are those of `render` and `rasterize`, files draw the same, what is broken is refused."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,6 +57,13 @@ def test_zoom_one_shows_the_whole_mesh_as_framing_does(session):
     view, mesh = MeshView(SIZE), session.content.mesh
     expected = tl.Camera.framing(mesh, aspect=SIZE[0] / SIZE[1]).clip_from_world(SIZE)
     assert np.allclose(view.camera(mesh).clip_from_world(SIZE), expected)
+
+
+@pytest.mark.parametrize(("axis", "up", "seen"), [("z", "file", "z"), ("y", "file", "y"), ("z", "y", "y")])
+def test_up_is_that_of_the_file_unless_the_view_says_another(session, axis, up, seen):
+    mesh, view = replace(session.content.mesh, up=axis), MeshView(SIZE, up=up)
+    wished = MeshView(SIZE, up=seen).camera(session.content.mesh)
+    assert np.array_equal(view.camera(mesh).view, wished.view)
 
 
 def test_pan_and_zoom_move_the_middle_of_the_mesh(session):
@@ -253,7 +261,7 @@ def test_page_without_a_mesh_begins_with_a_shape():
         ({"fov": 175}, "fov must be 0, or lie in 1 to 170 degrees, got 175"),
         ({"azimuth": float("inf")}, "azimuth must be finite"),
         ({"pan": [1]}, "pan must be two numbers"),
-        ({"up": "x"}, "up must be one of 'y', 'z'"),
+        ({"up": "x"}, "up must be one of 'file', 'y', 'z'"),
         ({"elevation": 91}, "elevation_deg must lie in -90 to 90"),
         ({"what": "gif"}, "what must be one of 'png', 'code', 'job', got 'gif'"),
     ],

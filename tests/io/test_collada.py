@@ -126,7 +126,7 @@ def test_collada_geometry_that_no_scene_places_is_told(read):
         read(b"<COLLADA><asset><up_axis>Z_UP</up_axis></asset></COLLADA>")
 
 
-@pytest.mark.parametrize(("axis", "up", "lines"), [("Z_UP", "z", []), ("Y_UP", "y", []), ("X_UP", "y", ["X_UP"])])
+@pytest.mark.parametrize(("axis", "up", "lines"), [("Z_UP", "z", []), ("Y_UP", "y", []), ("W_UP", "y", ["W_UP"])])
 def test_collada_up_axis_is_that_of_the_views_unless_they_say_another(read, axis, up, lines):
     mesh, told = read(collada(TRIANGLES, asset=f"<asset><up_axis>{axis}</up_axis></asset>"))
     assert told == [f"up axis not followed: '{line}'" for line in lines]
@@ -137,6 +137,25 @@ def test_collada_up_axis_is_that_of_the_views_unless_they_say_another(read, axis
     assert (tl.render(mesh, size=16) == tl.render(plain, tl.Camera.framing(plain, up=up), 16)).all()
     assert (tl.turntable(mesh, 2)[1].view == tl.turntable(plain, 2, up=up)[1].view).all()
     assert (tl.Camera.framing(mesh, up="y").view == tl.Camera.framing(plain).view).all()
+
+
+def test_collada_x_up_stands_upright(read):
+    plain, _ = read(collada(TRIANGLES))
+    mesh, told = read(collada(TRIANGLES, asset="<asset><up_axis>X_UP</up_axis></asset>"))
+    assert (mesh.up, told) == ("y", [])
+    assert np.array_equal(mesh.vertices, plain.vertices[:, [1, 0, 2]] * [-1, 1, 1])
+
+
+def test_command_environment_follows_the_axis_of_the_file(tmp_path, run):
+    (tmp_path / "a.dae").write_bytes(collada(TRIANGLES, asset="<asset><up_axis>Z_UP</up_axis></asset>"))
+    pictures = {}
+    for up in ("file", "y", "z"):
+        out = tmp_path / f"{up}.png"
+        more = [] if up == "file" else ["--up", up]
+        how = ["--environment", "white,black", "--azimuth", "0", "--size", "32x32", *more]
+        assert run("render", tmp_path / "a.dae", "-o", out, *how)[0] == 0
+        pictures[up] = Image.open(out).tobytes()
+    assert pictures["file"] == pictures["z"] != pictures["y"]
 
 
 def test_command_up_wins_over_the_axis_of_the_file(tmp_path, run):

@@ -5,6 +5,7 @@ Input: `Job`. Output: arrays, or files that are whole or not there.
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import time
@@ -17,7 +18,7 @@ from typing import Any, NamedTuple
 from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent
 from topleft._apps.batch.made import FromFile, record_of
 from topleft._core.base.array_types import Array, MeshLike
-from topleft._core.base.arrays import as_scale, as_size, shown
+from topleft._core.base.arrays import as_number, as_scale, as_size, shown
 from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.notes import Heard, listening, tell, tell_files
@@ -52,8 +53,8 @@ class Job:
         As for `render`.
     size : (width, height), pixels
     options : mapping
-        Other options of `render`, by name; "background" may be a function of the mesh (or scene); with "opacity" those
-        of `render_transparent`; for "flow" among the layers also "camera_to" and "transforms_to" of `render_layers`.
+        Other options of `render`, by name; "background" and "environment" may be functions of the scene; with "opacity"
+        those of `render_transparent`; for the layer "flow" also "camera_to" and "transforms_to" of `render_layers`.
     destination : path or URL, optional
         The file to be written; its folder is made. A URL is whatever fsspec can write to where the job is drawn.
         `{layer}` in the name stands for the name of a layer. None: the picture is returned.
@@ -61,6 +62,9 @@ class Job:
         Names that `render_layers` knows, made instead of the picture; "color" is the picture. Empty: the picture alone.
     scale : float
         Factor of the coordinates if the scene is a path; 0.001 makes metres of millimetres.
+    depth_scale : float
+        Units of a step of distances in PNG, as BOP has it: 1 for millimetres of a scene in millimetres; unless given
+        0.001, for millimetres of one in metres.
 
     Examples
     --------
@@ -78,6 +82,7 @@ class Job:
     destination: str | os.PathLike[str] | None = None
     layers: Sequence[LayerOption | str] = ()
     scale: float = field(default=1.0, kw_only=True)
+    depth_scale: float = field(default=0.001, kw_only=True)
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Mapping) or not all(isinstance(name, str) for name in self.options):
@@ -88,6 +93,8 @@ class Job:
             as_location("destination", self.destination)
         if as_scale(self.scale) != 1 and not isinstance(self.scene, str | os.PathLike):
             raise TypeError(f"scale is of a scene that is a path, got {shown(self.scene)}: load(path, scale=) has one")
+        if not 0 < as_number("depth_scale", self.depth_scale) < math.inf:
+            raise ValueError(f"depth_scale must be positive and finite, got {self.depth_scale}")
 
     def __repr__(self) -> str:
         """One line: the scene, the size and the destination."""
@@ -258,7 +265,8 @@ class JobRunner:
         if _is_read(job.scene):
             subject = MeshFile(os.fspath(job.scene)) if isinstance(job.scene, str | os.PathLike) else job.scene
         options = {name: value for name, value in job.options.items() if name != "threads"}
-        parts = job.files[0].suffix, job.checked.layers, job.checked.size, job.scale, options, job.camera, subject
+        layers, (first, *_), size = job.checked
+        parts = first.suffix, layers, size, job.scale, job.depth_scale, options, job.camera, subject
         return record_of(parts, _home_of(job), files)
 
     def _draw_one(self, job: Job, heard: Heard) -> Array | dict[str, Array] | None:
@@ -270,8 +278,9 @@ class JobRunner:
         scene = self._scene(job.scene, job.scale)
         camera = job.camera(scene, size) if callable(job.camera) else job.camera
         options = {"threads": 1, **job.options}
-        if callable(options.get("background")):
-            options["background"] = options["background"](scene)
+        for name in ("background", "environment"):
+            if callable(options.get(name)):
+                options[name] = options[name](scene)
         rasterizer = self._rasterizer(size)
         if not layers:
             if "opacity" in options:
@@ -287,8 +296,9 @@ class JobRunner:
         if job.destination is None:
             return {name: array.copy() for name, array in arrays.items()}  # out of the memory that is kept
         matrix = None if view.shot.camera.lens is not None else view.shot.camera.clip_from_world(size)
-        record = self._record(job, scene, heard.files)
-        save_layers(job.destination, arrays, matrix=matrix, background=_opaque(options), record=record)
+        record, background = self._record(job, scene, heard.files), _opaque(options)
+        how: dict[str, Any] = {"depth_scale": job.depth_scale, "matrix": matrix}
+        save_layers(job.destination, arrays, background=background, record=record, **how)
         return None
 
     def _scene(self, scene: Any, scale: float) -> Any:

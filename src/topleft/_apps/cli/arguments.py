@@ -180,9 +180,22 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments that a job of a job file may have, too."""
     add = parser.add_argument
     add("-o", "--out", metavar="OUT", help="a file, a folder or a pattern")
-    add("--size", type=size, default=DEFAULT_SIZE, metavar="WxH", help="pixels (default {}x{})".format(*DEFAULT_SIZE))
+    add(
+        "--size",
+        type=size,
+        default=DEFAULT_SIZE,
+        metavar="WxH",
+        help="pixels, or the side (default {}x{})".format(*DEFAULT_SIZE),
+    )
     add("--views", type=views, default=1, metavar="N", help="a turntable of N pictures (default 1)")
     add("--layers", type=_layers, default=(), metavar="NAME,...", help="layers to write; see below (default color)")
+    add(
+        "--depth-scale",
+        type=number(as_scale, "a positive number"),
+        default=0.001,
+        metavar="X",
+        help="units of a step of distances in PNG, as BOP has it: 1 for millimetres (default 0.001: of metres)",
+    )
     add("--time", type=SECONDS, metavar="SECONDS", help="of an animation of a glTF file (default: at rest)")
     add("--clip", type=_clip, metavar="N|NAME|all", help="which animation --time is of, from 0 (default the first)")
     add_scale(parser)
@@ -253,6 +266,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PX",
         help="of clouds of points: the diameter of a point, pixels (default %(default)g)",
     )
+    add("--root", metavar="FOLDER", help="meshes may name files of this folder, too (default: of their folder alone)")
     for option, limit in LIMITS.items():
         add(f"--{option.replace('_', '-')}", type=positive, metavar="N", help=f"refuse files of more {limit.what}")
 
@@ -281,10 +295,11 @@ def add_scale(parser: argparse.ArgumentParser) -> None:
 
 
 def size(text: str) -> tuple[int, int]:
-    """The width and height of a picture."""
+    """The width and height of a picture, or its side."""
     width, cross, height = text.lower().partition("x")
-    if not (cross and width.isdecimal() and height.isdecimal() and int(width) and int(height)):
-        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, got {text!r}")
+    height = height if cross else width
+    if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        raise argparse.ArgumentTypeError(f"must be WIDTHxHEIGHT, 1280x720 say, or the side of a square, got {text!r}")
     return int(width), int(height)
 
 

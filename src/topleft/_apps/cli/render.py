@@ -37,6 +37,9 @@ MOST_VIEWS_TOGETHER = 16
 """Views of a mesh that a process draws before it reports: it reads the mesh once for them."""
 
 
+BROKEN, AT_REST = "members of its archive left out", ": everything is at rest"
+"""Of warnings: a part of the input failed; the file has more moments than the one that is drawn, and lacks nothing."""
+
 CONNECT_S = 20
 """Seconds that a scheduler has to answer."""
 
@@ -82,7 +85,8 @@ def run_render(options: argparse.Namespace) -> int:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
             sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups], reasons)
             save_image(options.sheet, sheet)
-    return FAILED if failed or (lacks and options.strict) else 0
+    is_broken = any(BROKEN in line for line in lacks)
+    return FAILED if failed or is_broken or (options.strict and any(AT_REST not in line for line in lacks)) else 0
 
 
 def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]:

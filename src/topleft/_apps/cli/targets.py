@@ -11,6 +11,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,8 @@ class MeshSource(FromFile):
     time: float | None = None
     clip: int | str | None = None
     scale: float = 1.0
-    limits: tuple[tuple[str, int | None], ...] = ()
+    limits: tuple[tuple[str, int | str | None], ...] = ()
+    """What the file may have and name, as for `load`."""
 
     def __call__(self) -> Mesh | Points:
         """Read it."""
@@ -67,10 +69,8 @@ class MeshSource(FromFile):
             return Mesh(vertices * self.scale, triangles, crease=self.crease)
         if not Path(self.path).exists() and Path(self.path).name == self.path and "." not in self.path:
             raise UsageError(f"there is no file and no built-in shape {self.path!r}; shapes: {', '.join(SHAPES)}")
-        limits = dict(self.limits)
-        return load(
-            self.path, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, root=None, **limits
-        )
+        limits: dict[str, Any] = dict(self.limits)
+        return load(self.path, crease=self.crease, time=self.time, clip=self.clip, scale=self.scale, **limits)
 
 
 def read_texture(path: str) -> Texture:
@@ -78,20 +78,37 @@ def read_texture(path: str) -> Texture:
     return Texture(read_picture(path))
 
 
-def read_environment(text: str, up: str | None) -> Environment:
+def read_environment(text: str) -> Environment:
     """The light from all around of a colour, two colours, or the picture of a file."""
     from PIL import ImageColor
 
-    top = (0.0, 0.0, 1.0) if up == "z" else (0.0, 1.0, 0.0)
     try:
         colors = [ImageColor.getcolor(name.strip(), "RGB") for name in text.split(",")]
     except ValueError:
         if not Path(text).suffix:
             raise UsageError(f"--environment must be one or two colours or a picture, got {text!r}") from None
-        return Environment(image=read_picture(text)[..., :3], up=top)
+        return Environment(image=read_picture(text)[..., :3])
     if len(colors) > 2:
         raise UsageError(f"--environment must be one or two colours, got {len(colors)}")
-    return Environment(colors[0], colors[1] if len(colors) == 2 else None, up=top)  # type: ignore[arg-type]
+    return Environment(colors[0], colors[1] if len(colors) == 2 else None)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The light from all around of an environment; unless `up` is given the axis of the mesh is above."""
+
+    environment: Environment
+    up: str | None
+
+    def __call__(self, mesh: Mesh | Points) -> Environment:
+        """Return it."""
+        up = mesh.up if self.up is None and isinstance(mesh, Mesh) else self.up
+        return self.upright if up == "z" else self.environment
+
+    @cached_property
+    def upright(self) -> Environment:
+        """The environment with z up."""
+        return replace(self.environment, up=(0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -191,7 +208,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
         raise UsageError("--clip needs --time: which second of it")
     pattern = _pattern(options.out, options)
     drawing = _render_options(options)
-    limits = tuple((name, getattr(options, name)) for name in LIMITS)
+    limits = tuple((name, getattr(options, name)) for name in (*LIMITS, "root"))
     groups = []
     names = names_of(options.meshes, with_numbers="{index}" not in pattern, with_folders="{folder}" in pattern)
     folders = folders_of(options.meshes)
@@ -212,7 +229,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
                 camera = FileCamera(source, options.camera, *moment)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
-            jobs.append(Job(mesh, camera, options.size, drawing, path, layers))
+            jobs.append(Job(mesh, camera, options.size, drawing, path, layers, depth_scale=options.depth_scale))
         groups.append(MeshJobs(source, name, tuple(jobs)))
     return groups
 
@@ -275,7 +292,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     if options.matcap is not None:
         drawing["matcap"] = read_texture(options.matcap)
     if options.environment is not None:
-        drawing["environment"] = read_environment(options.environment, options.up)
+        drawing["environment"] = Surroundings(read_environment(options.environment), options.up)
     if options.opacity is None:
         return drawing | {"edges": options.wireframe, "sampling": options.sampling or default_sampling(options)}
     if options.wireframe or options.sampling not in (None, Sampling.CENTER):

@@ -71,7 +71,7 @@ CONTROLS: dict[str, list[tuple[str, str, list[tuple[Any, str]] | None]]] = {
     ],
     "Camera": [
         ("view angle", "fov", [(40, "40°"), (20, "20°"), (70, "70°"), (0, "no perspective")]),
-        ("up", "up", [("y", "y"), ("z", "z")]),
+        ("up", "up", [("file", "as the file says"), ("y", "y"), ("z", "z")]),
         ("turn by itself", "spin", None),
     ],
 }  # fmt: skip
@@ -90,7 +90,7 @@ HEAT_LABELS = ("1", "2", "3-4", "5-8", "9-16", "17-32", "33-64", "65 and more")
 WORDS = {
     "layer": LAYERS,
     "lights": tuple(LIGHTS),
-    "up": get_args(UpOption),
+    "up": ("file", *get_args(UpOption)),
     "cull": get_args(CullOption),
     "sampling": get_args(SamplesOption),
 }
@@ -107,7 +107,7 @@ class MeshView:
     zoom: float = 1.0  # 1: the sphere round the mesh just fits
     pan: tuple[float, float] = (0.0, 0.0)  # of the middle of the mesh, in half heights of the frame; right and up
     fov: float = 40.0  # degrees from bottom to top; 0 is without perspective
-    up: str = "y"
+    up: str = "file"  # or an axis
     layer: str = "smooth"  # one of `LAYERS`
     lights: str = "headlight"  # one of `LIGHTS`
     edges: bool = False
@@ -147,7 +147,8 @@ class MeshView:
         distance, height = (length / self.zoom for length in frame_of_sphere(radius, fov_y_deg, aspect))
         if not self.fov:
             distance = 4 * radius
-        matrix = orbit_view(center, distance, self.azimuth, self.elevation, up=self.up)  # type: ignore[arg-type]
+        up: Any = mesh.up if self.up == "file" else self.up
+        matrix = orbit_view(center, distance, self.azimuth, self.elevation, up=up)
         half_px = height / 2 if not self.fov else distance * tangent(fov_y_deg / 2)
         matrix[:2, 3] += np.array(self.pan) * half_px
         reach = 1.01 * radius
@@ -470,7 +471,7 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
         f'out = "{stem_of(shown)}.png"',
         f"azimuth = {view.azimuth % 360:.17g}",
         f"elevation = {view.elevation:.17g}",
-        f'up = "{view.up}"',
+        f'up = "{shown.mesh.up if view.up == "file" else view.up}"',
         'background = "transparent"',
         f'sampling = "{view.sampling}"',
         f"tolerance = {float(view.tolerance)!r}",

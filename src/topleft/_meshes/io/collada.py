@@ -38,6 +38,9 @@ NUMBERS_OF = {"matrix": 16, "translate": 3, "rotate": 4, "scale": 3, "lookat": 9
 
 WRAPS: dict[str, WrapOption] = {"MIRROR": "mirror", "CLAMP": "clamp", "BORDER": "clamp", "NONE": "clamp"}
 
+X_UP = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+"""From axes with x up and -y to the right to those with y up and x to the right."""
+
 NODES_OF_LIST = 4
 """Nodes of glTF that take as long as a list of triangles."""
 
@@ -74,7 +77,8 @@ class _Collada:
         self._sets = {row.get("texcoord") for row in root.iter("texture")}
         axis = (root.findtext("asset/up_axis") or "Y_UP").strip()
         self._up: UpOption = "z" if axis == "Z_UP" else "y"
-        if axis not in ("Y_UP", "Z_UP"):
+        self._upright = X_UP if axis == "X_UP" else np.eye(4)
+        if axis not in ("X_UP", "Y_UP", "Z_UP"):
             self._notes.add("up axis not followed", axis)
 
     def _at(self, tag: str, url: str | None) -> Element | None:
@@ -99,7 +103,7 @@ class _Collada:
         below = {node: list(self._nodes_below(node)) for node in self._root.iter() if node.tag == "node"}
         below[scene] = list(self._nodes_below(scene))
         self._source.budget.spend("max_nodes", sum(n for n, _ in walks(below, [scene]).values()))
-        stack = [(scene, np.eye(4))]
+        stack = [(scene, self._upright)]
         while stack:
             node, above = stack.pop()
             place = engine.product(above, _transform(node))

@@ -27,8 +27,8 @@ RANGES = {"camera_normal": (-1.0, 1.0), "world_normal": (-1.0, 1.0), "barycentri
 """Layers of three channels that eight bits show: the values of 0 and 255."""
 
 LENGTHS = ("distance", "ray_distance")
-MILLIMETRES = 1000.0
-"""Steps of a unit of length, if none are given: as most datasets of depth have."""
+MILLIMETRE = 0.001
+"""Units of a step of length, if none are given: as most datasets of depth have."""
 
 LARGEST = 65535
 
@@ -51,6 +51,7 @@ def save_layers(
     layers: Mapping[str, Array],
     *,
     scale: float | None = None,
+    depth_scale: float = MILLIMETRE,
     matrix: npt.NDArray[np.float64] | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
     record: tuple[str, ...] = (),
@@ -72,6 +73,8 @@ def save_layers(
     layers : mapping of str to ndarray
     scale : float, optional
         Steps a unit for numbers in PNG that are no ids, instead of these.
+    depth_scale : float
+        Units of a step of distances in PNG.
     matrix : (4, 4) float64, optional
         Clip space from the world; goes into .npz with the layers, as `clip_from_world`. Its planes are not those of the
         depth of a camera that has none.
@@ -90,13 +93,15 @@ def save_layers(
         write_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix}, record=record)
         return (place,)
     # All are converted before the first is written: a layer that does not fit leaves no file.
-    stored = {name: _stored(paths[name], name, array, scale) for name, array in layers.items()}
+    stored = {name: _stored(paths[name], name, array, scale, depth_scale) for name, array in layers.items()}
     for name, (array, text) in stored.items():
         write_image(paths[name], array, background=background, text=text, record=record)
     return tuple(paths.values())
 
 
-def _stored(path: Location, name: str, array: Array, scale: float | None) -> tuple[Array, dict[str, str] | None]:
+def _stored(
+    path: Location, name: str, array: Array, scale: float | None, depth_scale: float
+) -> tuple[Array, dict[str, str] | None]:
     """The array as the file holds it, and notes on its scale."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz") or array.dtype == np.uint8:
@@ -110,7 +115,7 @@ def _stored(path: Location, name: str, array: Array, scale: float | None) -> tup
         step = (high - low) / 255
         return np.rint((array - low) / step).clip(0, 255).astype(np.uint8), _notes(name, step, low)
     if suffix == ".png" and array.ndim == 2 and array.size:
-        return _numbers_of_16_bits(path, name, array, scale)
+        return _numbers_of_16_bits(path, name, array, scale, depth_scale)
     raise ImageError(
         f"cannot write {str(path)!r}: {path.suffix} cannot hold the layer {name!r}, {array.dtype} {array.shape}; "
         "take .npz or .tiff"
@@ -118,7 +123,7 @@ def _stored(path: Location, name: str, array: Array, scale: float | None) -> tup
 
 
 def _numbers_of_16_bits(
-    path: Location, name: str, array: Array, scale: float | None
+    path: Location, name: str, array: Array, scale: float | None, depth_scale: float
 ) -> tuple[npt.NDArray[np.uint16], dict[str, str]]:
     """Numbers in equal steps; 0 where they are not finite, or ids that are -1."""
     if array.dtype == np.int32:
@@ -127,7 +132,7 @@ def _numbers_of_16_bits(
     is_there = np.isfinite(array)
     numbers = array[is_there].astype(np.float64)
     if scale is not None or name in LENGTHS:
-        step, offset = 1 / (MILLIMETRES if scale is None else float(scale)), 0.0
+        step, offset = depth_scale if scale is None else 1 / scale, 0.0
         steps = np.rint(numbers / step)
     else:
         ends = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 1.0)
