@@ -7,6 +7,7 @@ uncompressed, or, while the view turns, as a JPEG, which a browser shows sooner.
 from __future__ import annotations
 
 import io
+import json
 import math
 import tempfile
 import threading
@@ -424,9 +425,10 @@ def as_code(shown: Shown, view: MeshView) -> tuple[str, bytes]:
     words = [f"{name}={value!r}" for name, value in look.items()]
     if lights:
         words.append("lights=[" + ", ".join(light_code(light) for light in lights) + "]")
+    mesh = f"tl.Mesh(*tl.scenes.shape({shown.name!r}))" if shown.name in SHAPES else f"tl.load({shown.name!r})"
     lines = [
         '"""A view of the explorer of topleft."""', "", "import topleft as tl", "",
-        f"mesh = {mesh_code(shown)}",
+        f"mesh = {mesh}",
         "camera = tl.Camera(",
         f"    view={camera.view.tolist()!r},",
         f"    projection={camera.projection.tolist()!r},",
@@ -446,13 +448,6 @@ def as_code(shown: Shown, view: MeshView) -> tuple[str, bytes]:
     return f"{stem_of(shown)}.py", ("\n".join(lines) + "\n").encode()
 
 
-def mesh_code(shown: Shown) -> str:
-    """Return the expression of a mesh."""
-    if shown.name in SHAPES:
-        return f"tl.Mesh(*tl.scenes.shape({shown.name!r}))"
-    return f"tl.load({shown.name!r})"
-
-
 def light_code(light: Light) -> str:
     """Return the expression of a light."""
     at = tuple(float(x) for x in light.at)
@@ -467,7 +462,7 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
         f"size = [{view.size[0]}, {view.size[1]}]",
         "",
         "[[job]]",
-        f"mesh = {toml_text(shown.name)}",
+        f"mesh = {json.dumps(''.join(filter(str.isprintable, shown.name)), ensure_ascii=False)}",
         f'out = "{stem_of(shown)}.png"',
         f"azimuth = {view.azimuth % 360:.17g}",
         f"elevation = {view.elevation:.17g}",
@@ -485,12 +480,6 @@ def as_job(shown: Shown, view: MeshView) -> tuple[str, bytes]:
     if view.edges and view.layer in SHADINGS:
         lines.append("wireframe = true")
     return f"{stem_of(shown)}.toml", ("\n".join(lines) + "\n").encode()
-
-
-def toml_text(text: str) -> str:
-    """Return a TOML string."""
-    printable = "".join(c for c in text if c.isprintable())
-    return '"' + printable.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 HANDLERS = {

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -282,7 +282,7 @@ def _parts_of_geometry(geometry: Any, *, is_member: bool = False) -> Iterator[li
     elif kind in ("Polygon", "MultiPolygon"):
         areas = _member(geometry, "coordinates")
         for rings in [areas] if kind == "Polygon" else areas:
-            yield [_xy(ring) for ring in rings]
+            yield [[(p[0], p[1]) for p in ring] for ring in rings]
     elif is_member and kind in LOWER_KINDS:
         _tell_of({kind})
     else:
@@ -301,10 +301,6 @@ def _member(geometry: Any, key: str) -> Any:
         return geometry[key]
     except KeyError:
         raise ValueError(f"a {geometry['type']} of GeoJSON must have {key}, got only {', '.join(geometry)}") from None
-
-
-def _xy(ring: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
-    return [(p[0], p[1]) for p in ring]
 
 
 def _depth(values: Any) -> int:
