@@ -334,3 +334,49 @@ def test_field_of_float32_values_of_the_other_byte_order_is_float32():
 def test_height_map_of_more_pixels_than_numbers_count_is_refused():
     with pytest.raises(ValueError, match="pixel_size must give a grid of countable pixels"):
         tl.height_map(([[0, 0, 0], [4e10, 0, 0], [0, 4, 0]], [[0, 1, 2]]), 1e-300)
+
+
+QUADRATIC = {  # on the unit square or the triangle below its diagonal
+    "triangle6": [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5)],
+    "triangle7": [(0, 0), (1, 0), (0, 1), (0.5, 0), (0.5, 0.5), (0, 0.5), (1 / 3, 1 / 3)],
+    "quad8": [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)],
+    "quad9": [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5), (0.5, 0.5)],
+}
+
+
+class Cells:
+    """A mesh with the attributes of meshio's."""
+
+    def __init__(self, points, blocks, point_data=None, cell_data=None):
+        self.points = np.array(points, float)
+        self.cells = [SimpleNamespace(type=kind, data=np.array(rows)) for kind, rows in blocks]
+        self.point_data, self.cell_data = point_data or {}, cell_data or {}
+
+
+@pytest.mark.parametrize("kind", QUADRATIC)
+def test_field_of_quadratic_cells_has_the_values_of_all_their_points(kind):
+    points = np.array(QUADRATIC[kind])
+    mesh = Cells(points, [(kind, [range(len(points))])], {"u": points[:, 0] ** 2}, {"zone": [[7]]})
+    grid = tl.Grid((8, 8), (0, 1, 0, 1))
+    found, inside = tl.field(mesh, "u", grid), tl.polygons([points[: 3 if kind[0] == "t" else 4]], grid)
+    assert np.array_equal(np.isfinite(found), inside)
+    x, _ = np.meshgrid(grid.x_centers, grid.y_centers)
+    assert np.abs(found - x**2)[inside].max() < 0.07  # a quarter of the 0.25 from corner to corner, or about so
+    assert np.array_equal(tl.field(mesh, "zone", grid, nodata=0) == 7, inside)
+
+
+def test_field_takes_data_of_a_mesh_by_name():
+    points = [(0, 0), (4, 0), (4, 4), (0, 4), (8, 0)]
+    blocks = [("line", [[0, 1]]), ("quad", [[0, 1, 2, 3]]), ("triangle", [[1, 4, 2]])]
+    data = {"u": np.arange(5.0)}
+    mesh = Cells(points, blocks, data, {"zone": [np.array([9]), np.array([1]), np.array([2])]})
+    grid = tl.Grid((8, 4), (0, 8, 0, 4))
+    assert np.array_equal(tl.field(mesh, "u", grid), tl.field(mesh, data["u"], grid), equal_nan=True)
+    assert set(tl.field(mesh, "zone", grid, nodata=0)[1].tolist()) == {1, 2, 0}
+    with pytest.raises(ValueError, match=r"values must be numbers or a name of data of the mesh \(u, zone\), got 'v'"):
+        tl.field(mesh, "v", grid)
+    with pytest.raises(ValueError, match=r"name of data of the mesh \(none\), got 'v'"):
+        tl.field((points, [[0, 1, 2]]), "v", grid)
+    solid = Cells([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [("tetra", [[0, 1, 2, 3]])], {}, {"zone": [[1]]})
+    with pytest.raises(ValueError, match="values 'zone' are of solid cells, and their skin is drawn"):
+        tl.field(solid, "zone", grid)

@@ -94,7 +94,7 @@ def test_as_mesh_of_meshio_takes_surface_cells():
 
 
 def test_as_surface_of_cells_knows_the_faces():
-    quads, triangles = block("quad8", [[0, 1, 2, 3, 9, 9, 9, 9]]), block("triangle6", [[1, 4, 2, 9, 9, 9]])
+    quads, triangles = block("quad", [[0, 1, 2, 3]]), block("triangle", [[1, 4, 2]])
     polygons = as_polygons(cells(POINTS, quads, triangles))
     assert polygons.triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 4, 2]]
     assert polygons.faces.tolist() == [0, 0, 1]

@@ -34,6 +34,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.rasterize import Canvas, draw
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
+from topleft._meshes.model.cells import data_of
 from topleft._meshes.scene.adapt import as_polygons
 from topleft.typing import PerOption, SurfaceOption, YOption
 
@@ -66,8 +67,9 @@ def field(
     ----------
     mesh : matplotlib.tri.Triangulation, meshio.Mesh, pyvista.PolyData, (points, triangles), ...
         Whatever `as_mesh` takes; z is not looked at. Where triangles overlap, the later one is seen.
-    values : array_like of real numbers, shape (V,) per vertex or (F,) per face
-        Faces are the triangles, or the polygons that they were cut from. A NaN makes its triangles NaN.
+    values : array_like of real numbers, shape (V,) per vertex or (F,) per face, or str
+        Faces are the triangles, or the polygons or quadratic cells that they were cut from. A NaN makes its triangles
+        NaN. A name is that of data of points or cells of a mesh of meshio or pyvista.
     size : (width, height) or Grid, optional
         How many pixels; or the grid, which then says all.
     origin : (column, row), pixels
@@ -124,6 +126,8 @@ def field(
     The centres on the slanted side belong to the triangle on its other side, if there is one.
     """
     polygons = as_polygons(mesh)
+    if isinstance(values, str):
+        values, per = data_of(mesh, values)
     points = as_plane_points("points", polygons.points)
     array = as_array("values", apart_from(out, "values", values))
     check_real("values", array, "fiub")

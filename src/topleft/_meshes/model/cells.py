@@ -5,7 +5,7 @@ Input: meshes of meshio, pyvista and matplotlib, or arrays; `adapt.py` tells the
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +13,17 @@ import numpy.typing as npt
 
 from topleft._core.base.arrays import as_array
 from topleft._meshes.model.polygons import triangulate
+from topleft.typing import PerOption
 
-CORNERS_OF_CELL = {"triangle": 3, "triangle6": 3, "triangle7": 3, "quad": 4, "quad8": 4, "quad9": 4, "polygon": None}
-"""Corners of the surface cells of meshio, which come first in a row; `None`: all of the row. Of curved cells the points
-on their edges and inside are left out: they are drawn straight, from corner to corner."""
+CUTS = {
+    "triangle6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    "triangle7": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 6), (4, 5, 6), (5, 3, 6)),
+    "quad8": ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6), (4, 6, 7)),
+    "quad9": ((0, 4, 8), (0, 8, 7), (4, 1, 5), (4, 5, 8), (8, 5, 2), (8, 2, 6), (7, 8, 6), (7, 6, 3)),
+}
+"""Triangles of the quadratic surface cells of meshio, between all of their points."""
+
+SURFACE_CELLS = ("triangle", "quad", "polygon", *CUTS)
 
 SIDES_OF_SOLID = {
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -111,19 +118,54 @@ def of_cells(subject: Any) -> Polygons:
 def _of_cells(points: npt.NDArray[Any], blocks: Iterable[Any]) -> Polygons:
     """Triangles of the surface cells of meshio, block after block; where there are none, of the skin of solid ones."""
     blocks = [block for block in blocks if len(block.data)]
-    drawn: Mapping[str, object] = CORNERS_OF_CELL
-    if not any(block.type in drawn for block in blocks):
-        drawn = SOLID_OF_CELL
+    has_surface = any(block.type in SURFACE_CELLS for block in blocks)
+    drawn: Collection[str] = SURFACE_CELLS if has_surface else SOLID_OF_CELL
     kept = [(block.type, as_array("cells", block.data)) for block in blocks if block.type in drawn]
     if not kept:
         kinds = ", ".join(block.type for block in blocks) or "none"
         raise ValueError(f"mesh has no triangles: its cells are {kinds}")
-    if drawn is CORNERS_OF_CELL:
-        polygons = _of_blocks(points, [cells[:, : CORNERS_OF_CELL[kind]] for kind, cells in kept])
+    if has_surface:
+        polygons = _of_surface(points, kept)
     else:
         polygons = _skin(points, [(SOLID_OF_CELL[kind], cells) for kind, cells in kept])
     not_drawn = dict.fromkeys(block.type for block in blocks if block.type not in drawn)
     return polygons._replace(not_drawn=tuple(not_drawn))
+
+
+def _of_surface(points: npt.NDArray[Any], kept: list[tuple[str, npt.NDArray[Any]]]) -> Polygons:
+    """Triangles of surface cells by kind; the parts of a quadratic cell have its number."""
+    parts = [cells[:, np.array(CUTS[kind])].reshape(-1, 3) if kind in CUTS else cells for kind, cells in kept]
+    polygons = _of_blocks(points, parts)
+    if all(kind not in CUTS for kind, _ in kept):
+        return polygons
+    n_parts = np.concatenate([np.full(len(cells), len(CUTS.get(kind, "1"))) for kind, cells in kept])
+    cells_of_parts = np.repeat(np.arange(len(n_parts)), n_parts)
+    faces = cells_of_parts if polygons.faces is None else cells_of_parts[polygons.faces]
+    return polygons._replace(faces=faces, n_faces=len(n_parts))
+
+
+def data_of(subject: Any, name: str) -> tuple[npt.NDArray[Any], PerOption]:
+    """The values of points or cells that a mesh of meshio or pyvista has by a name, and which of both they are of."""
+    known = []
+    tables: tuple[tuple[str, PerOption], ...] = (("point_data", "vertex"), ("cell_data", "triangle"))
+    for table, per in tables:
+        there: Any = getattr(subject, table, {})
+        names = list(there.keys())
+        if name in names:
+            values = there[name]
+            if isinstance(values, list):  # by blocks of cells, as meshio has it
+                pairs = zip(values, subject.cells, strict=True)
+                values = [rows for rows, block in pairs if block.type in SURFACE_CELLS and len(block.data)]
+                if not values:
+                    raise ValueError(
+                        f"values {name!r} are of solid cells, and their skin is drawn: take some of points"
+                    )
+                values = np.concatenate(values)
+            return np.asarray(values), per
+        known += names
+    raise ValueError(
+        f"values must be numbers or a name of data of the mesh ({', '.join(known) or 'none'}), got {name!r}"
+    )
 
 
 def of_grid(subject: Any) -> Polygons:
