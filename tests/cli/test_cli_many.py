@@ -18,8 +18,9 @@ from PIL import Image
 
 from topleft import scenes
 from topleft._apps.cli import animation
+from topleft._apps.cli.render import _captions
 from topleft._apps.cli.sheet import make_sheet, wrapped
-from topleft._apps.cli.targets import Orbit
+from topleft._apps.cli.targets import MeshJobs, Orbit
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.render import rasterize_mesh, render
@@ -319,6 +320,27 @@ def test_sheet_of_pictures_of_many_sizes_keeps_them_apart(tmp_path):
     expected = np.full(sheet.shape, 255, np.uint8)
     expected[8 + 14 : 8 + 26, 8:68] = expected[8:48, 76 + 20 : 76 + 40] = [200, 0, 0]
     assert np.array_equal(sheet, expected)
+
+
+def test_sheet_of_several_meshes_has_one_background(run, folder):
+    for name, color in (("a", "1 1 1"), ("b", "1 0 0")):
+        rows = "".join(f"v {corner} {color}\n" for corner in ("0 0 0", "1 0 0", "0 1 0"))
+        (folder / f"{name}.obj").write_text(rows + "f 1 2 3\n")
+    assert run("render", "a.obj", "b.obj", "--sheet", "s.png", *SMALL) == (0, [])
+    sheet = pixels("s.png")
+    assert sheet[8, 8].tolist() == sheet[8, 8 + 72].tolist() == [196, 212, 232]
+
+
+def test_sheet_names_meshes_of_one_stem_by_their_folders():
+    groups = [MeshJobs(f"{name}/model.obj", f"model-{name}", ()) for name in "ab"] + [MeshJobs("c.obj", "c", ())]
+    assert _captions(groups) == ["a/model.obj", "b/model.obj", "c"]
+
+
+def test_sheet_cuts_long_captions_in_front(tmp_path):
+    Image.new("RGBA", (60, 12), (200, 0, 0, 255)).save(tmp_path / "a.png")
+    sheet = make_sheet([[tmp_path / "a.png"]] * 2, ["a very long name of a mesh.obj", ""])
+    assert (sheet[20:, :68] != 255).any()
+    assert (sheet[20:, 72:] == 255).all()
 
 
 def test_sheet_leaves_room_for_what_failed(run, folder):

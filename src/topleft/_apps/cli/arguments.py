@@ -220,7 +220,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         "--background",
         type=_rgba,
         metavar="COLOR",
-        help="a name, #rrggbb[aa] or transparent (default white; behind white meshes a light blue-grey)",
+        help="a name, #rrggbb[aa] or transparent (default white; behind white meshes and on sheets a light blue-grey)",
     )
     add(
         "--crease",

@@ -12,6 +12,7 @@ import sys
 import tempfile
 import threading
 import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor
 from contextlib import ExitStack, contextmanager
@@ -28,7 +29,7 @@ from topleft._apps.cli.arguments import FAILED, REFUSED, UsageError
 from topleft._apps.cli.job_file import read_jobs
 from topleft._apps.cli.report import TOLD, check_report, complain, complain_of_lacks, one_line, write_report
 from topleft._apps.cli.sheet import make_sheet
-from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, plan_jobs
+from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, folders_of, plan_jobs
 from topleft._core.base.defaults import PICTURE_SUFFIXES
 from topleft._core.base.remote import is_url
 from topleft.errors import MeshWarning, MissingPackageError
@@ -83,7 +84,7 @@ def run_render(options: argparse.Namespace) -> int:
                 save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
-            sheet = make_sheet([_color_files(group) for group in groups], [group.name for group in groups], reasons)
+            sheet = make_sheet([_color_files(group) for group in groups], _captions(groups), reasons)
             save_image(options.sheet, sheet)
     is_broken = any(BROKEN in line for line in lacks)
     return FAILED if failed or is_broken or (options.strict and any(AT_REST not in line for line in lacks)) else 0
@@ -98,6 +99,17 @@ def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]
         is_named = not reason or len(groups) == 1 or group.source in reason
         reasons.append(reason if is_named else f"{group.source}: {reason}")
     return reasons
+
+
+def _captions(groups: Sequence[MeshJobs]) -> list[str]:
+    """The name of each mesh, or its file and folder where another mesh has that stem."""
+    sources = [group.source for group in groups]
+    n_of = Counter(Path(source).stem for source in sources)
+    rows = zip(groups, folders_of(sources), strict=True)
+    return [
+        group.name if n_of[Path(group.source).stem] == 1 else Path(folder, Path(group.source).name).as_posix()
+        for group, folder in rows
+    ]
 
 
 def _plan(options: argparse.Namespace, stack: ExitStack) -> list[MeshJobs]:

@@ -61,6 +61,9 @@ def make_sheet(
         row, column = (i, 0) if n_views > 1 else (i // n_columns, i % n_columns)
         if len(captions) == 1:
             row, column = n_rows - 1, 0
+        room = (n_columns if len(captions) == 1 else 1) * step_x - GAP
+        while pen.textlength(caption) > room:
+            caption = f"..{caption[3:]}"  # names differ at their ends more often
         pen.text((GAP + column * step_x + 2, GAP + row * step_y + height + 2), caption, fill=INK)
     return np.asarray(sheet)
 

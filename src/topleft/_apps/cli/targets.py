@@ -283,7 +283,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     drawing = {
         "shading": options.shading,
         "color": options.color,
-        "background": Backdrop() if options.background is None else options.background,
+        "background": options.background or (BACKDROP if options.sheet and len(options.meshes) > 1 else Backdrop()),
         "cull": options.cull,
         "subpixel_bits": options.subpixel_bits,
         "tolerance": options.tolerance,

@@ -16,7 +16,7 @@ const AREA_ERROR = 2 ** -20;
 const HEAT = [[0, 0, 0, 0], [158, 202, 225, 255], [230, 159, 0, 255], [213, 94, 0, 255], [122, 31, 92, 255]];
 
 // Of nothing, no difference, the first alone, the second alone, another owner, another count; none is one of a triangle.
-const DIFFERENCES = [[0, 0, 0, 0], [128, 128, 128, 70], [94, 60, 153, 255], [166, 206, 57, 255], [190, 20, 60, 255], [44, 44, 52, 255]];
+const DIFFERENCES = [[0, 0, 0, 0], [128, 128, 128, 70], [94, 60, 153, 255], [166, 206, 57, 255], [190, 20, 60, 255], [20, 130, 210, 255]];
 
 const INK = [60, 72, 88];
 const BESIDE_EXACT = "beside the exact picture of the vertices as they are: each pixel counts once";
