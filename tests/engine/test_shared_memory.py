@@ -18,50 +18,50 @@ SIZE = (128, 128)
 VERTICES = np.array([[-10.0, -10], [300, -10], [-10, 300]])
 
 
-def test_fill_into_memory_of_triangles_is_that_of_separate_memory():
-    out = np.zeros((128, 128, 4), np.uint8)
-    triangles = out.reshape(-1)[:192].view(np.int32).reshape(16, 3)
-    triangles[...] = [0, 1, 2]
-    colors = np.full((16, 4), 0x70, np.uint8)
-    before = out.copy()
-    expected = tl.fill(VERTICES, triangles.copy(), colors, SIZE, per="triangle", blend="over", out=before)
-    assert_same(tl.fill(VERTICES, triangles, colors, SIZE, per="triangle", blend="over", out=out), expected)
+CORNERS = [[0, 1, 2]]
+COLORS = np.array([[200, 10, 20, 255], [1, 2, 3, 255]], np.uint8)
+DEEP = np.column_stack([VERTICES / 3, [0, 0, 0]])
+RING = np.array([[3, 3], [60, 5], [50, 60], [7, 40]], np.float32)
+SIX = np.random.default_rng(0).uniform(0, 64, (6, 2))
+STRIP = np.array([[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5]], np.int32)
+#: What `out` is, an input that lies at its beginning, and what is drawn of it.
+INTO_INPUTS = {
+    "fill, triangles": (np.zeros((128, 128, 4), np.uint8), np.tile(np.int32(CORNERS), (16, 1)), lambda triangles, out:
+                        tl.fill(VERTICES, triangles, np.full((16, 4), 112, "u1"), SIZE, per="triangle", blend="over",
+                                out=out)),
+    "fill, colors": (np.zeros((128, 128, 4), np.uint8), COLORS, lambda colors, out:
+                     tl.fill(VERTICES, CORNERS * 2, colors, SIZE, per="triangle", out=out)),
+    **{f"overdraw by {method}": (np.zeros((128, 128), np.int32), np.tile(np.int32(CORNERS), (1000, 1)),
+                                 lambda triangles, out, method=method:
+                                 tl.overdraw(VERTICES, triangles, SIZE, method=method, out=out))
+       for method in ("auto", "edge", "float_barycentric")},
+    "overdraw, vertices": (np.zeros((128, 128), np.int32), VERTICES, lambda vertices, out:
+                           tl.overdraw(vertices, CORNERS, SIZE, out=out)),
+    "wireframe, depth": (np.zeros((128, 128), np.float32), np.full((128, 128), np.inf, np.float32), lambda depth, out:
+                         tl.wireframe(DEEP, CORNERS, SIZE, depth=depth, antialias=True, out=out)),
+    "polygons, points": (np.zeros((64, 64), np.float32), RING, lambda points, out:
+                         tl.polygons(points, (64, 64), sampling="area", out=out)),
+    "polygons, offsets": (np.zeros((64, 64), np.int32), np.array([0, 4]), lambda offsets, out:
+                          tl.polygons((RING, offsets), (64, 64), values="index", out=out)),
+    "field, triangles": (np.zeros((64, 64)), STRIP, lambda triangles, out:
+                         tl.field((SIX, triangles), np.arange(6.0), (64, 64), out=out)),
+    "field, values": (np.zeros((64, 64)), np.arange(6.0), lambda values, out:
+                      tl.field((SIX, STRIP), values, (64, 64), out=out)),
+}  # fmt: skip
 
 
-def test_fill_into_memory_of_colors_is_that_of_separate_memory():
-    out = np.zeros((128, 128, 4), np.uint8)
-    colors = out.reshape(-1, 4)[:2]
-    colors[...] = [[200, 10, 20, 255], [1, 2, 3, 255]]
-    expected = tl.fill(VERTICES, [[0, 1, 2]] * 2, colors.copy(), SIZE, per="triangle", out=out.copy())
-    assert_same(tl.fill(VERTICES, [[0, 1, 2]] * 2, colors, SIZE, per="triangle", out=out), expected)
-
-
-@pytest.mark.parametrize("method", ["auto", "edge", "float_barycentric"])
-def test_overdraw_into_memory_of_triangles_is_that_of_separate_memory(method):
-    out = np.zeros((128, 128), np.int32)
-    triangles = out.reshape(-1)[: 3 * 1000].reshape(1000, 3)
-    triangles[...] = [0, 1, 2]
-    expected = tl.overdraw(VERTICES, triangles.copy(), SIZE, method=method)
-    assert_same(tl.overdraw(VERTICES, triangles, SIZE, method=method, out=out), expected)
-
-
-def test_overdraw_into_memory_of_vertices_is_that_of_separate_memory():
-    out = np.zeros((128, 128), np.int32)
-    vertices = out.reshape(-1)[:12].view(np.float64).reshape(3, 2)
-    vertices[...] = VERTICES
-    assert_same(tl.overdraw(vertices, [[0, 1, 2]], SIZE, out=out), tl.overdraw(VERTICES, [[0, 1, 2]], SIZE))
-
-
-def test_wireframe_into_memory_of_its_depth_is_that_of_separate_memory():
-    depth = np.full((128, 128), np.inf, np.float32)
-    scene = np.column_stack([VERTICES / 3, [0, 0, 0]]), [[0, 1, 2]]
-    expected = tl.wireframe(*scene, SIZE, depth=depth.copy(), antialias=True)
-    assert_same(tl.wireframe(*scene, SIZE, depth=depth, antialias=True, out=depth), expected)
+@pytest.mark.parametrize("name", INTO_INPUTS)
+def test_picture_into_memory_of_an_input_is_that_of_separate_memory(name):
+    out, given, draw = INTO_INPUTS[name]
+    inside = out.reshape(-1).view(np.uint8)[: given.nbytes].view(given.dtype).reshape(given.shape)
+    inside[...] = given
+    expected = draw(given, out.copy())
+    assert np.array_equal(draw(inside, out), expected, equal_nan=expected.dtype.kind == "f")
 
 
 def test_wireframe_of_a_depth_at_an_odd_address_is_that_of_an_aligned_one():
     odd = np.zeros(4 * 128 * 128 + 1, np.uint8)[1:].view(np.float32).reshape(128, 128)
-    scene = np.column_stack([VERTICES / 3, [1, 1, 1]]), [[0, 1, 2]]
+    scene = DEEP + [0, 0, 1], CORNERS
     assert_same(tl.wireframe(*scene, SIZE, depth=odd), tl.wireframe(*scene, SIZE, depth=odd.copy()))
 
 
@@ -186,45 +186,10 @@ def test_what_was_drawn_is_not_pickled_and_says_what_to_take(draw):
         pickle.dumps(drawn)
 
 
-def test_polygons_into_memory_of_their_points_are_those_of_separate_memory():
-    out = np.zeros((64, 64), np.float32)
-    points = out.reshape(-1)[:8].reshape(4, 2)
-    points[...] = [[3, 3], [60, 5], [50, 60], [7, 40]]
-    expected = tl.polygons(points.copy(), (64, 64), sampling="area")
-    assert_same(tl.polygons(points, (64, 64), sampling="area", out=out), expected)
-
-
-def test_polygons_into_memory_of_their_offsets_are_those_of_separate_memory():
-    out = np.zeros((64, 64), np.int32)
-    offsets = out.reshape(-1)[:4].view(np.int64)
-    offsets[...] = [0, 4]
-    points = np.array([[3.0, 3], [60, 5], [50, 60], [7, 40]])
-    expected = tl.polygons((points, offsets.copy()), (64, 64), values="index")
-    assert_same(tl.polygons((points, offsets), (64, 64), values="index", out=out), expected)
-
-
 def test_polygons_of_offsets_at_an_odd_address_are_those_of_aligned_ones():
     odd = np.zeros(17, np.uint8)[1:].view(np.int64)
     odd[...] = [0, 4]
-    points = np.array([[3.0, 3], [60, 5], [50, 60], [7, 40]])
-    assert_same(tl.polygons((points, odd), (64, 64)), tl.polygons(points, (64, 64)))
-
-
-@pytest.mark.parametrize("name", ["triangles", "values"])
-def test_field_into_memory_of_its_inputs_is_that_of_separate_memory(name):
-    out = np.zeros((64, 64))
-    triangles = out.reshape(-1)[:6].view(np.int32)[:12].reshape(4, 3)
-    values = out.reshape(-1)[64:70]
-    points = np.random.default_rng(0).uniform(0, 64, (6, 2))
-    triangles[...], values[...] = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5]], range(6)
-    given = {"triangles": triangles.copy(), "values": values.copy()}
-    expected = tl.field((points, given["triangles"]), given["values"], (64, 64))
-    given[name] = triangles if name == "triangles" else values
-    assert_same_or_nan(tl.field((points, given["triangles"]), given["values"], (64, 64), out=out), expected)
-
-
-def assert_same_or_nan(got, expected):
-    assert np.array_equal(got, expected, equal_nan=True)
+    assert_same(tl.polygons((RING, odd), (64, 64)), tl.polygons(RING, (64, 64)))
 
 
 @pytest.mark.parametrize("wrong", [1, 10**8])

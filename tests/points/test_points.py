@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, kept, on
+from engine_cases import ON_EACH_ISA, assert_same_everywhere, kept, on
 
 import topleft as tl
 from topleft._core.raster.sampling import POSITIONS
@@ -60,28 +60,15 @@ def test_samples_see_points_as_the_exact_reference_does(shape):
         assert_same(found.sample(k).point, ids)
 
 
-@pytest.mark.parametrize("threads", THREADS)
-@ON_EACH_ISA
-def test_points_have_the_same_bits_on_each_isa_with_any_threads(isa, threads):
+def test_points_have_the_same_bits_everywhere():
     rng = np.random.default_rng(5)
-    positions = rng.uniform(-10, 210, (5000, 3))
-    sizes = rng.uniform(0.1, 9, 5000)
-    with on("scalar"):
-        expected = tl.points(positions, (200, 150), point_size=sizes, shape="disc", threads=1)
-    with on(isa):
-        found = tl.points(positions, (200, 150), point_size=sizes, shape="disc", threads=threads)
+    positions, sizes = rng.uniform(-10, 210, (5000, 3)), rng.uniform(0.1, 9, 5000)
 
-    assert_same(found.point, expected.point)
-    assert_same(found.depth, expected.depth)
+    def draw(size, **view):
+        found = tl.points(positions, size, point_size=sizes, shape="disc", **view)
+        return found.point, found.depth
 
-
-def test_a_window_shows_its_part_of_the_picture():
-    positions = strewn(6)
-    whole = tl.points(positions, SIZE, point_size=4, shape="disc")
-    part = tl.points(positions, (9, 7), point_size=4, shape="disc", origin=(5, 3))
-
-    assert_same(part.point, whole.point[3:10, 5:14])
-    assert_same(part.depth, whole.depth[3:10, 5:14])
+    assert_same_everywhere(draw, (200, 150), [((5, 3), (9, 7)), ((90, 40), (110, 109))])
 
 
 def test_a_point_too_small_for_any_sample_shows_in_its_pixel():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import assert_same_everywhere
 
 import topleft as tl
 from topleft._core.base.color import srgb_tables
@@ -88,12 +88,8 @@ def test_samples_of_a_cloud_are_averaged_as_light():
     assert_same(picture[..., :3], encode[np.rint(decode[colors].mean(axis=2)).astype(int)])
 
 
-@ON_EACH_ISA
-def test_pictures_of_a_cloud_have_the_same_bits_on_each_isa(isa):
-    with on("scalar"):
-        expected = tl.render(CLOUD, CAMERA, SIZE, sampling="msaa4", threads=1)
-    with on(isa):
-        assert_same(tl.render(CLOUD, CAMERA, SIZE, sampling="msaa4"), expected)
+def test_pictures_of_a_cloud_have_the_same_bits_everywhere():
+    assert_same_everywhere(lambda size, **view: [tl.render(CLOUD, CAMERA, size, sampling="msaa4", **view)], SIZE)
 
 
 def test_layers_of_a_cloud_are_those_of_its_points():

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 import shading_reference as reference
 from comparing import assert_same
+from engine_cases import assert_same_everywhere
 from layer_views import look
 from leaf_cases import CAMERA, HOLES, LEAF, N_LAYERS, SIZE, cut, layers
 
 import topleft as tl
-from topleft._core import engine
-from topleft._core.engine.isa import build_info
 from topleft._meshes.picture.holes import cuts_of, draw_visible
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.picture.transparent import solid_layers
@@ -60,28 +59,14 @@ def test_cutout_without_holes_is_the_visibility_buffer():
 
 @ON_EACH_BITS
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])
-def test_cutout_threads_and_windows_change_no_bit(sampling, bits):
-    mesh = layers((2, 0, 3, 1))
-    options = {"sampling": sampling, "subpixel_bits": bits}
-    whole = cut(mesh, threads=1, **options)
-    three = cut(mesh, threads=3, **options)
-    part = cut(mesh, (40, 33), origin=(21, 17), viewport=SIZE, **options)
-    assert_same(three.samples_triangle, whole.samples_triangle)
-    assert_same(three.samples_depth, whole.samples_depth)
-    assert_same(part.samples_triangle, whole.samples_triangle[17:50, 21:61])
+def test_cutout_has_the_same_bits_everywhere(sampling, bits):
+    mesh = layers(ORDER)
 
+    def draw(size, **view):
+        frags = cut(mesh, size, sampling=sampling, subpixel_bits=bits, **view)
+        return frags.samples_triangle, frags.samples_depth
 
-@ON_EACH_BITS
-def test_cutout_each_isa_gives_the_same_bits(bits):
-    mesh, name, found = layers((2, 0, 3, 1)), build_info()["isa"], []
-    try:
-        for isa in engine.isa_available():
-            engine.use_isa(isa)
-            found.append(cut(mesh, sampling="msaa4", subpixel_bits=bits).samples_triangle)
-    finally:
-        engine.use_isa(name)
-    for other in found[1:]:
-        assert_same(other, found[0])
+    assert_same_everywhere(draw, SIZE, [((21, 17), (40, 33))], (1, 3))
 
 
 @ON_EACH_BITS

@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, mixed, on
+from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
@@ -194,24 +194,14 @@ def crowd():
     return soup(np.concatenate([vertices, rng.uniform(-1e6, 1e6, (90, 2))]), (131, 67))
 
 
-@ON_EACH_ISA
-def test_area_is_the_same_on_any_isa_and_threads(isa):
+def test_area_is_the_same_everywhere():
     scene = crowd()
-    with on("scalar"):
-        expected = draw(scene, threads=1)
-    for n in THREADS:
-        with on(isa):
-            assert_same(draw(scene, threads=n), expected)
 
+    def draw_there(size, **view):
+        return [draw(Scene(scene.vertices, scene.triangles, size), **view)]
 
-@ON_EACH_ISA
-def test_area_of_a_window_is_the_crop(isa):
-    scene = crowd()
-    with on(isa):
-        whole = draw(scene)
-        for x, y, width, height in [(0, 0, 1, 1), (5, 7, 33, 20), (64, 1, 67, 66), (130, 66, 1, 1), (17, 40, 16, 3)]:
-            part = draw(Scene(scene.vertices, scene.triangles, (width, height)), origin=(x, y))
-            assert_same(part, whole[y : y + height, x : x + width])
+    windows = [(0, 0, 1, 1), (5, 7, 33, 20), (64, 1, 67, 66), (130, 66, 1, 1), (17, 40, 16, 3)]
+    assert_same_everywhere(draw_there, scene.size, [(w[:2], w[2:]) for w in windows])
 
 
 @ON_EACH_ISA

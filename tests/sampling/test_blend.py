@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
-from engine_cases import ON_EACH_ISA, THREADS, mixed, on
+from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on
 from strategies import Scene, perspective, soup
 
 import topleft as tl
@@ -223,39 +223,19 @@ KINDS = [
     ("replace", np.uint8, 3, True, "area"),
     ("over", np.float32, 4, True, "area"),
 ]
-ON_EACH_KIND = pytest.mark.parametrize(("mode", "dtype", "n_channels", "per_vertex", "sampling"), KINDS)
 
 
-@lru_cache(None)
-def scalar_picture(mode, dtype, n_channels, per_vertex, sampling):
-    colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
-    with on("scalar"):
-        return crowd_picture(colors, blend=mode, background=1, sampling=sampling, threads=1)
-
-
-@ON_EACH_ISA
-@ON_EACH_KIND
-def test_blend_is_the_same_on_any_isa_and_threads(mode, dtype, n_channels, per_vertex, sampling, isa):
-    colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
-    options = {"blend": mode, "background": 1, "sampling": sampling}
-    expected = scalar_picture(mode, dtype, n_channels, per_vertex, sampling)
-    for n in THREADS:
-        with on(isa):
-            assert_same(crowd_picture(colors, threads=n, **options), expected)
-
-
-@ON_EACH_ISA
-@ON_EACH_KIND
-def test_blend_of_a_window_is_the_crop(mode, dtype, n_channels, per_vertex, sampling, isa):
+@pytest.mark.parametrize(("mode", "dtype", "n_channels", "per_vertex", "sampling"), KINDS)
+def test_blend_is_the_same_everywhere(mode, dtype, n_channels, per_vertex, sampling):
     scene, _ = crowd()
     colors = crowd_colors(dtype, n_channels, per_vertex=per_vertex)
-    with on(isa):
-        whole = crowd_picture(colors, blend=mode, background=1, sampling=sampling)
-        for x, y, width, height in [(0, 0, 1, 1), (5, 7, 33, 20), (90, 1, 67, 82), (156, 82, 1, 1), (17, 40, 16, 3)]:
-            window = Scene(scene.vertices, scene.triangles, (width, height))
-            per = "vertex" if per_vertex else "triangle"
-            part = draw(window, colors, per=per, blend=mode, background=1, origin=(x, y), sampling=sampling)
-            assert_same(part, whole[y : y + height, x : x + width])
+    options = {"per": "vertex" if per_vertex else "triangle", "blend": mode, "background": 1, "sampling": sampling}
+
+    def draw_there(size, **view):
+        return [draw(Scene(scene.vertices, scene.triangles, size), colors, **options, **view)]
+
+    windows = [(0, 0, 1, 1), (5, 7, 33, 20), (90, 1, 67, 82), (156, 82, 1, 1), (17, 40, 16, 3)]
+    assert_same_everywhere(draw_there, scene.size, [(w[:2], w[2:]) for w in windows])
 
 
 @ON_EACH_ISA

@@ -39,26 +39,29 @@ def palette(n: int, channels: int, dtype: type) -> np.ndarray:
     return colors.astype(dtype) if dtype is np.uint8 else (colors / 255).astype(dtype)
 
 
+def assert_few_equal_many(vertices: object, colors: np.ndarray, **options: object) -> None:
+    """Check that triangles are filled as if there were many."""
+    few, many = meshes(vertices)
+    options["per"] = "triangle"
+    assert (tl.fill(*few, colors[:-N_OTHERS], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+
+
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_fill_of_few_triangles_equals_that_of_many(shape, sampling):
-    few, many = meshes(SHAPES[shape])
-    colors, options = palette(1, 4, np.uint8), {"per": "triangle", "sampling": sampling}
-    assert (tl.fill(*few, colors[:1], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+    assert_few_equal_many(SHAPES[shape], palette(1, 4, np.uint8), sampling=sampling)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize("channels", [2, 4])
 @pytest.mark.parametrize("blend", ["over", "add", "multiply", "max", "min"])
-def test_blend_of_few_triangles_equals_that_of_many(blend, channels, dtype):
-    few, many = meshes(two_triangles())
-    colors = palette(2, channels, dtype)
-    background = np.full(channels, 0.25 if dtype is np.float32 else 9)
-    for last in (0, 100, 255):
-        colors[1, -1] = last if dtype is np.uint8 else last / 255
-        for alpha in ("straight", "premultiplied"):
-            options = {"per": "triangle", "background": background, "blend": blend, "alpha": alpha}
-            assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+def test_blend_of_few_triangles_equals_that_of_many(blend, dtype):
+    for channels in (2, 4):
+        colors = palette(2, channels, dtype)
+        background = np.full(channels, 0.25 if dtype is np.float32 else 9)
+        for last in (0, 100, 255):
+            colors[1, -1] = last if dtype is np.uint8 else last / 255
+            for alpha in ("straight", "premultiplied"):
+                assert_few_equal_many(two_triangles(), colors, background=background, blend=blend, alpha=alpha)
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -95,42 +98,30 @@ def test_fill_by_area_over_a_background_equals_one_over_a_picture(shape, blend):
     {"subpixel_bits": 0}, {"subpixel_bits": 16}, {"origin": (50, -70), "viewport": (900, 800)},
 ])  # fmt: skip
 def test_fill_with_options(options):
-    few, many = meshes(two_triangles())
-    colors = palette(2, 4, np.uint8)
     for sampling in ("center", "msaa4"):
-        own = {"per": "triangle", "background": (1, 2, 3, 4), "sampling": sampling, **options}
-        assert (tl.fill(*few, colors[:2], SIZE, **own) == tl.fill(*many, colors, SIZE, **own)).all()
+        assert_few_equal_many(
+            two_triangles(), palette(2, 4, np.uint8), background=(1, 2, 3, 4), sampling=sampling, **options
+        )
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize("channels", [1, 2, 3, 4])
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa16"])
-def test_fill_has_the_colours_of_labels(sampling, channels, dtype):
-    few, many = meshes(two_triangles())
-    colors = palette(2, channels, dtype)
-    for alpha in ("straight", "premultiplied"):
-        options = {"per": "triangle", "background": np.full(channels, 0.25 if dtype is np.float32 else 9),
-                   "sampling": sampling, "alpha": alpha}  # fmt: skip
-        assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+def test_fill_has_the_colours_of_labels(sampling, dtype):
+    for channels in (1, 2, 3, 4):
+        options = {"background": np.full(channels, 0.25 if dtype is np.float32 else 9), "sampling": sampling}
+        for alpha in ("straight", "premultiplied"):
+            assert_few_equal_many(two_triangles(), palette(2, channels, dtype), alpha=alpha, **options)
 
 
-@pytest.mark.parametrize("sampling", ["msaa4", "msaa8"])
-def test_fill_averages_light(sampling):
-    few, many = meshes(two_triangles())
-    colors, options = palette(2, 4, np.uint8), {"per": "triangle", "resolve": "linear", "sampling": sampling}
-    assert (tl.fill(*few, colors[:2], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
-
-
-def test_fill_of_a_fan_of_many_colours():
+def test_fill_averages_light_and_draws_a_fan_of_many_colours():
     angles = np.linspace(0, 2 * np.pi, 15)
     rim = np.stack([380 + 300 * np.cos(angles), 350 + 330 * np.sin(angles)], 1)
-    corners = np.stack([np.broadcast_to([380.2, 351.3], (14, 2)), rim[:-1], rim[1:]], 1)
-    few, many = meshes(corners.reshape(-1, 2))
-    for channels, dtype in ((3, np.uint8), (4, np.float32)):
-        colors = palette(14, channels, dtype)
-        for sampling in ("center", "msaa4", "msaa8"):
-            options = {"per": "triangle", "sampling": sampling}
-            assert (tl.fill(*few, colors[:14], SIZE, **options) == tl.fill(*many, colors, SIZE, **options)).all()
+    fan = np.stack([np.broadcast_to([380.2, 351.3], (14, 2)), rim[:-1], rim[1:]], 1).reshape(-1, 2)
+    for sampling in ("center", "msaa4", "msaa8"):
+        if sampling != "center":
+            assert_few_equal_many(two_triangles(), palette(2, 4, np.uint8), resolve="linear", sampling=sampling)
+        for channels, dtype in ((3, np.uint8), (4, np.float32)):
+            assert_few_equal_many(fan, palette(14, channels, dtype), sampling=sampling)
 
 
 def test_pieces_of_a_triangle_that_planes_cut():

@@ -1,13 +1,9 @@
 """What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
 
-import os
 import pickle
-import subprocess
-import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -52,26 +48,22 @@ def on(isa):
         engine.use_isa(before)
 
 
-PRINT_HASH = """
-import hashlib, importlib, sys
-module, *samplings = sys.argv[1:]
-digest = hashlib.sha256()
-for sampling in samplings:
-    for picture in importlib.import_module(module).everything(sampling=sampling):
-        digest.update(picture.tobytes())
-print(digest.hexdigest())
-"""
+def assert_same_everywhere(draw, size, windows=(), threads=THREADS):
+    """Pictures have the same bits on each instruction set and with any threads, and windows hold their crops.
 
-
-def hashes_on_each_isa(path, *samplings):
-    """The hashes of what `everything` of a file of tests draws, in a process for each instruction set."""
-    found = set()
+    `draw` takes a size and options of a view, and gives some pictures; windows are (origin, size).
+    """
+    whole = None
     for isa in tl.build_info()["isa_available"]:
-        places = os.pathsep.join([str(Path(path).parent), *sys.path])
-        environment = {**os.environ, "TOPLEFT_ISA": isa, "PYTHONPATH": places}
-        command = [sys.executable, "-c", PRINT_HASH, Path(path).stem, *samplings]
-        found.add(subprocess.run(command, env=environment, capture_output=True, check=True).stdout)
-    return found
+        with on(isa):
+            for n in threads:
+                got = list(draw(size, threads=n))
+                whole = whole or got
+                for one, expected in zip(got, whole, strict=True):
+                    assert_same(one, expected)
+            for (x, y), (width, height) in windows:
+                for one, expected in zip(draw((width, height), origin=(x, y), viewport=size), whole, strict=True):
+                    assert_same(one, expected[y : y + height, x : x + width])
 
 
 def flat_grid(side=129):
