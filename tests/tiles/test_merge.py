@@ -20,6 +20,12 @@ def whole_and_scene(seed, depth_test, n=40, size=(37, 29), flat=False):
     return points, triangles, tl.rasterize(points, triangles, size, depth_test=depth_test)
 
 
+def assert_merged(found, whole):
+    """Ids and depths that were merged are those that were drawn at once."""
+    for got, expected in zip(found, (whole.samples_triangle, whole.samples_depth), strict=True):
+        assert got.tobytes() == expected.tobytes()
+
+
 @given(
     seed=st.integers(0, 2**32),
     cuts=st.lists(st.integers(0, 40), max_size=5),
@@ -34,9 +40,7 @@ def test_neighbouring_shares_in_any_order_make_the_whole(seed, cuts, depth_test,
     shares = list(itertools.pairwise(bounds))
     order.shuffle(shares)
     buffers = (tl.rasterize(points, triangles[a:b], (37, 29), depth_test=depth_test) for a, b in shares)
-    ids, depth = tl.merge(buffers, triangles=[a for a, _ in shares], depth_test=depth_test)
-    assert ids.tobytes() == whole.triangle.tobytes()
-    assert depth.tobytes() == whole.depth.tobytes()
+    assert_merged(tl.merge(buffers, triangles=[a for a, _ in shares], depth_test=depth_test), whole)
 
 
 @pytest.mark.parametrize("depth_test", ["less", "greater", None])
@@ -46,9 +50,7 @@ def test_scattered_shares_make_the_whole(depth_test, threads):
     owner = np.random.default_rng(2).integers(0, 3, 40)
     shares = [np.flatnonzero(owner == i) for i in range(3)]
     buffers = [tl.rasterize(points, triangles[own], (37, 29), depth_test=depth_test) for own in shares]
-    ids, depth = tl.merge(buffers, triangles=shares, depth_test=depth_test, threads=threads)
-    assert np.array_equal(ids, whole.triangle)
-    assert np.array_equal(depth, whole.depth)
+    assert_merged(tl.merge(buffers, triangles=shares, depth_test=depth_test, threads=threads), whole)
     assert (buffers[1].triangle < len(shares[1])).all()  # what was given is as it was
 
 
@@ -60,18 +62,14 @@ def test_merging_in_a_tree_is_merging_at_once():
         ids = np.where(frags.triangle < 0, -1, frags.triangle + first).astype(np.int32)
         buffers.append((ids, frags.depth))
     pairs = [tl.merge(buffers[i : i + 2]) for i in (0, 2)]
-    ids, depth = functools.reduce(lambda a, b: tl.merge([a, b]), pairs)
-    assert np.array_equal(ids, whole.triangle)
-    assert np.array_equal(depth, whole.depth)
+    assert_merged(functools.reduce(lambda a, b: tl.merge([a, b]), pairs), whole)
 
 
 def test_samples_are_merged_one_by_one():
     points, triangles, _ = whole_and_scene(12, "less")
     whole = tl.rasterize(points, triangles, (37, 29), sampling="msaa4")
     shares = [tl.rasterize(points, triangles[a : a + 20], (37, 29), sampling="msaa4") for a in (0, 20)]
-    ids, depth = tl.merge(shares, triangles=[0, 20])
-    assert np.array_equal(ids, whole.samples_triangle)
-    assert np.array_equal(depth, whole.samples_depth)
+    assert_merged(tl.merge(shares, triangles=[0, 20]), whole)
 
 
 @pytest.mark.parametrize("sampling", ["center", "msaa4"])

@@ -57,33 +57,22 @@ def equal(found, wished):
 # Zarr
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("chunk", [None, (32, 16)])
-def test_zarr_is_the_raster(tmp_path, kind, chunk):
+@pytest.mark.parametrize(
+    ("kind", "window", "options"),
+    [
+        *((kind, 64, {"chunk": chunk}) for kind in KINDS for chunk in (None, (32, 16))),
+        *(("labels", 2048, {"chunk": chunk}) for chunk in (64, 512)),
+        *(("labels", 64, {"compression": compression}) for compression in ("gzip", "zstd", "none")),
+    ],
+)
+def test_zarr_is_the_raster(tmp_path, kind, window, options):
     zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
-    raster = raster_of(kind)
-    raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
+    raster = raster_of(kind, window)
+    raster.to_zarr(tmp_path / "a.zarr", **options)
     found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")
     assert (found.shape, found.dtype) == (raster.shape, raster.dtype)
+    assert window == 64 or found.chunks == (options["chunk"],) * 2
     assert equal(found[:], raster[:])
-
-
-@pytest.mark.parametrize("chunk", [64, 512])
-def test_zarr_of_one_window_has_chunks_of_any_size(tmp_path, chunk):
-    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
-    raster = raster_of("labels", window=2048)
-    raster.to_zarr(tmp_path / "a.zarr", chunk=chunk)
-    found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")
-    assert found.chunks == (chunk, chunk)
-    assert equal(found[:], raster[:])
-
-
-@pytest.mark.parametrize("compression", ["gzip", "zstd", "none"])
-def test_zarr_is_compressed_as_asked(tmp_path, compression):
-    zarr = pytest.importorskip("zarr", reason="the tiles extra is not installed")
-    raster = raster_of("labels")
-    raster.to_zarr(tmp_path / "a.zarr", compression=compression)
-    assert equal(zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")[:], raster[:])
 
 
 def test_zarr_chunks_can_be_read_without_a_package(tmp_path):
@@ -358,6 +347,20 @@ WRITERS = {
 }
 
 
+def interrupted(raster, path, is_time=lambda step: True):
+    """Write until the progress is that of a time; returns the steps that were told."""
+    steps = []
+
+    def stop(step):
+        steps.append(step)
+        if is_time(step):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        WRITERS[path.name](raster, path, progress=stop)
+    return steps
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_what_does_not_fit_the_disk_is_told_before_a_byte_is_written(tmp_path, name, monkeypatch):
     usage = shutil.disk_usage(tmp_path)
@@ -368,24 +371,12 @@ def test_what_does_not_fit_the_disk_is_told_before_a_byte_is_written(tmp_path, n
 
 
 @pytest.mark.parametrize("name", WRITERS)
-def test_what_is_there_is_not_written_over(tmp_path, name):
-    WRITERS[name](raster_of("labels"), tmp_path / name)
-    with pytest.raises(FileExistsError, match="exists: resume=True goes on with it"):
-        WRITERS[name](raster_of("labels"), tmp_path / name)
-
-
-@pytest.mark.parametrize("name", WRITERS)
 def test_what_is_of_another_run_is_refused(tmp_path, name):
-    def interrupt(step):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        WRITERS[name](raster_of("labels"), tmp_path / name, progress=interrupt)
+    interrupted(raster_of("labels"), tmp_path / name)
     others = [raster_of("coverage"), raster_of("labels", 32), raster_of("labels", mesh=(POINTS + 1, TRIANGLES))]
+    message = "is not of this raster: the mesh, an option or the size of windows differs"
     for other in others:
-        with pytest.raises(
-            ValueError, match="is not of this raster: the mesh, an option or the size of windows differs"
-        ):
+        with pytest.raises(ValueError, match=message):
             WRITERS[name](other, tmp_path / name, resume=True)
     WRITERS[name](raster_of("labels"), tmp_path / name, resume=True)
 
@@ -398,15 +389,7 @@ def test_interrupted_run_goes_on(tmp_path, name):
     for n in (1, 4):
         folder = tmp_path / str(n)
         folder.mkdir()
-        steps = []
-
-        def stop(step, steps=steps, n=n):
-            steps.append(step)
-            if len(steps) == n:
-                raise KeyboardInterrupt
-
-        with pytest.raises(KeyboardInterrupt):
-            WRITERS[name](raster_of("labels", mesh=CORNER), folder / name, progress=stop)
+        steps = interrupted(raster_of("labels", mesh=CORNER), folder / name, lambda step, n=n: step.n_done >= n)
         seen = []
         written = WRITERS[name](raster_of("labels", mesh=CORNER), folder / name, progress=seen.append, resume=True)
         assert written.n_kept >= n
@@ -456,19 +439,26 @@ def test_lock_holds_between_processes_and_ends_with_a_killed_one(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["a.tif"]
 
 
+PLACES = {"a.zarr": "a.zarr/labels/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}
+
+
 @pytest.mark.parametrize("name", WRITERS)
-def test_part_that_has_gone_is_told(tmp_path, name):
+def test_part_that_goes_or_is_damaged_meanwhile_is_told(tmp_path, name):
     """A blank part would be a lie."""
-    place = {"a.zarr": "a.zarr/labels/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
+    harms = [(FileNotFoundError, "has gone while the raster was written: resume", Path.unlink),
+             (OSError, r"is damaged \(.*\): resume=True writes it", lambda path: path.write_bytes(b"x"))]  # fmt: skip
+    for k, (error, message, harm) in enumerate(harms):
+        folder = tmp_path / str(k)
+        folder.mkdir()
 
-    def clean(step):
-        if step.n_done == step.n_blocks:
-            (tmp_path / place).unlink()
+        def spoil(step, folder=folder, harm=harm, k=k):
+            if step.n_done == (19 if k else step.n_blocks):
+                harm(folder / PLACES[name])
 
-    with pytest.raises(FileNotFoundError, match=r"(1.2|4_8|8_4\.png) has gone while the raster was written: resume"):
-        WRITERS[name](raster_of("labels"), tmp_path / name, progress=clean)
-    assert not (tmp_path / name).is_file()
-    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
+        with pytest.raises(error, match=rf"(1.2|4_8|8_4\.png) {message}"):
+            WRITERS[name](raster_of("labels"), folder / name, progress=spoil)
+        assert not (folder / name).is_file()
+        assert WRITERS[name](raster_of("labels"), folder / name, resume=True).n_drawn == 1
 
 
 @pytest.mark.parametrize("options", [{}, {"resume": True}, {"overwrite": True}])
@@ -664,13 +654,7 @@ def test_damaged_tile_is_written_again(tmp_path, name, damage):
         (tmp_path / folder).mkdir()
     WRITERS[name](raster_of("labels"), tmp_path / "whole" / name)
     where = {"a.zarr": "a.zarr/{}/labels/c", "a.tif": "a.tif.parts/{}", "a.dzi": "a_files/{}"}[name]
-
-    def stop(step):
-        if step.n_done > 20:  # the 19 windows, and two of the next level
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, progress=stop)
+    interrupted(raster_of("labels"), tmp_path / "cut" / name, lambda step: step.n_done > 20)  # windows, and two more
     for level in (9, 8) if name == "a.dzi" else (0, 1):
         tiles = [
             path
@@ -682,19 +666,6 @@ def test_damaged_tile_is_written_again(tmp_path, name, damage):
     written = WRITERS[name](raster_of("labels"), tmp_path / "cut" / name, resume=True)
     assert (written.n_drawn, written.n_kept) == (1, 18)
     assert files_of(tmp_path / "cut") == files_of(tmp_path / "whole")
-
-
-@pytest.mark.parametrize("name", WRITERS)
-def test_tile_that_is_damaged_meanwhile_is_told(tmp_path, name):
-    place = {"a.zarr": "a.zarr/labels/c/1/2", "a.tif": "a.tif.parts/0/4_8", "a.dzi": "a_files/9/8_4.png"}[name]
-
-    def harm(step):
-        if step.n_done == 19:
-            (tmp_path / place).write_bytes(b"x")
-
-    with pytest.raises(OSError, match=r"(1.2|4_8|8_4\.png) is damaged \(.*\): resume=True writes it again"):
-        WRITERS[name](raster_of("labels"), tmp_path / name, progress=harm)
-    assert WRITERS[name](raster_of("labels"), tmp_path / name, resume=True).n_drawn == 1
 
 
 KILLED = """
