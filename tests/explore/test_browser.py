@@ -309,35 +309,6 @@ def test_page_says_that_its_server_has_ended(page, explorer):
     page.wait_for_function("() => document.querySelector('.status').textContent.includes('has ended')")
 
 
-def test_drag_to_new_pixels_is_timed(chromium, explorer, capsys):
-    square = {"vertices": [[2.3, 3.1], [61.2, 5.7], [4.9, 60.3], [60.1, 58.8]], "triangles": [[0, 1, 2], [1, 3, 2]]}
-    state = square | {"size": [64, 64], "other": "bresenham_scanline", "exact": True}
-    with opened(chromium, explorer, f"#pixels={json.dumps(state)}") as page:
-        x, y = grip(page, 3)
-        page.mouse.move(x, y)
-        page.mouse.down()
-        times = page.evaluate(
-            """async ([x, y]) => {
-              const part = document.querySelector(".explorer").app.parts.pixels, times = [];
-              const sheet = document.querySelector('[data-key="a"] svg');
-              for (let i = 0; i < 60; i++) {
-                const drawn = new Promise((resolve) => { part.onDrawn = resolve; }), start = performance.now();
-                const at = {clientX: x - 40 * Math.sin(i / 5), clientY: y - i / 2, pointerType: "mouse"};
-                sheet.dispatchEvent(new PointerEvent("pointermove", at));
-                await drawn;
-                times.push(performance.now() - start);
-                await new Promise(requestAnimationFrame);
-              }
-              return times;
-            }""",
-            [x, y],
-        )
-        page.mouse.up()
-        check_pictures(page)
-    with capsys.disabled():
-        print(f"\ndrag to new pixels, 64x64, two methods and the exact picture: median {np.median(times):.1f} ms")
-
-
 def test_page_works_in_the_cell_of_a_notebook(page):
     """A model as anywidget's: messages with buffers, which need not begin at multiples of eight bytes."""
     content = content_of([[1, 1], [12, 3], [2, 9]], [[0, 1, 2]], (14, 11))

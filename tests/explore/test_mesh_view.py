@@ -86,14 +86,6 @@ def test_ids_have_a_color_each(session, layer):
     assert len(np.unique(names)) == len(np.unique(frame)) == len(set(zip(names.ravel(), frame.ravel(), strict=True)))
 
 
-def test_clusters_hold_every_triangle_and_no_more_than_256():
-    mesh = tl.Mesh(*tl.scenes.blob(30_000))
-    counts = np.bincount(mesh.clusters.of_triangles())
-    assert len(counts) == len(mesh.clusters)
-    assert counts.sum() == len(mesh.triangles)
-    assert 0 < counts.min() <= counts.max() <= 256
-
-
 def test_overdraw_has_the_colors_of_its_legend(session):
     header, arrays = ask(session, "draw", layer="overdraw")
     mesh, camera = session.content.mesh, MeshView(SIZE).camera(session.content.mesh)

@@ -178,14 +178,6 @@ def test_scene_area_is_that_of_the_mesh_of_all():
     assert got.max() == 1
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, 0)])
-def test_scene_empty_picture_has_its_shape(size):
-    frags = rasterize_mesh(many(), CAMERA, size)
-    assert frags.triangle.shape == frags.instance.shape == size[::-1]
-    assert tl.silhouette(many(), CAMERA, size).shape == size[::-1]
-    assert tl.render(many(), CAMERA, size).shape == (*size[::-1], 4)
-
-
 def test_scene_out_holds_the_mask():
     out = np.ones((70, 180), bool)[:, ::2]
     assert tl.silhouette(many(), CAMERA, SIZE, out=out) is out

@@ -75,8 +75,3 @@ def test_mesh_seen_in_a_mirror_keeps_its_back():
     camera = tl.Camera(CAMERA.view @ mirror, CAMERA.projection, CAMERA.aspect)
     expected = tl.render(moved(mesh, mirror), CAMERA, SIZE)
     assert np.abs(tl.render(mesh, camera, SIZE).astype(int) - expected).max() <= 1  # float32 in another space
-
-
-def test_scene_light_of_another_type_is_refused():
-    with pytest.raises(TypeError, match="lights must be of Light, got tuple"):
-        tl.render(tl.Scene([bowl()]), CAMERA, SIZE, lights=[(0, 1, 0)])

@@ -1,7 +1,6 @@
 """Silhouettes are `coverage` through a camera."""
 
 import numpy as np
-import pytest
 from comparing import assert_same
 
 import topleft as tl
@@ -50,8 +49,3 @@ def test_silhouette_goes_to_out():
     out = np.ones(SIZE[::-1], bool)
     assert tl.silhouette(TORUS, camera_of(TORUS), SIZE, out=out) is out
     assert_same(out, tl.silhouette(TORUS, camera_of(TORUS), SIZE))
-
-
-def test_silhouette_of_nothing_raises():
-    with pytest.raises(ValueError, match="there is nothing to frame"):
-        tl.silhouette(tl.Mesh(np.zeros((0, 3)), np.zeros((0, 3), int)), size=SIZE)

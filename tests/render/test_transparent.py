@@ -103,16 +103,6 @@ def test_transparent_opaque_picture_is_that_of_render():
     assert_same(tl.render_transparent(CUBE, size=SIZE, opacity=1), tl.render(CUBE, size=SIZE))
 
 
-def test_transparent_mesh_and_scene_of_one_are_the_same():
-    assert_same(tl.render_transparent(SPHERE, size=SIZE), tl.render_transparent(tl.Scene([SPHERE]), size=SIZE))
-
-
-@pytest.mark.parametrize("size", [(0, 5), (5, 0)])
-def test_transparent_empty_picture_has_its_shape(size):
-    for subject in (CUBE, many()):
-        assert tl.render_transparent(subject, CAMERA, size).shape == (*size[::-1], 4)
-
-
 def test_transparent_bad_options_are_refused():
     with pytest.raises(ValueError, match="opacity must lie in 0 to 1, got 2"):
         tl.render_transparent(CUBE, size=(4, 4), opacity=2)

@@ -232,11 +232,12 @@ def test_only_what_is_asked_for_is_computed():
 
 @pytest.mark.parametrize("size", [(0, 3), (3, 0)])
 def test_empty_picture_has_its_shapes(size):
-    names = [name for name in LAYER_NAMES if name != "uv"]
+    camera, names = CAMERAS["perspective"], [name for name in LAYER_NAMES if name != "uv"]
     for subject in (CUBE, scene()):
-        found = render_layers(subject, CAMERAS["perspective"], size, layers=names, camera_to=CAMERAS["perspective"])
-        for name in names:
-            assert found[name].shape[:2] == size[::-1]
+        found = [*render_layers(subject, camera, size, layers=names, camera_to=camera).values()]
+        found += [draw(subject, camera, size) for draw in (tl.render, tl.render_transparent, tl.silhouette)]
+        found.append(tl.rasterize_mesh(subject, camera, size).instance)
+        assert {one.shape[:2] for one in found} == {size[::-1]}
 
 
 def test_layers_are_a_mapping_with_a_short_repr():
@@ -248,37 +249,21 @@ def test_layers_are_a_mapping_with_a_short_repr():
 # ---- errors ---------------------------------------------------------------------------------------------------------
 
 
-def test_unknown_layer_is_refused():
-    with pytest.raises(ValueError, match=r"layers must be some of color, alpha, .* flow, got 'colour'"):
-        render_layers(CUBE, layers="colour")
-
-
-def test_attribute_with_the_name_of_a_layer_is_refused():
-    with pytest.raises(ValueError, match="attributes must not have the name of a layer, got 'depth'"):
-        render_layers(CUBE, size=(4, 3), attributes={"depth": np.zeros(8)})
-
-
-def test_flow_without_an_end_is_refused():
-    with pytest.raises(ValueError, match="layer 'flow' needs camera_to or transforms_to"):
-        render_layers(CUBE, layers="flow")
-
-
-def test_uv_without_coordinates_is_refused():
-    with pytest.raises(ValueError, match="layer 'uv' needs a mesh that has texture coordinates"):
-        render_layers(CUBE, layers="uv")
-
-
 @pytest.mark.parametrize(
-    ("transforms", "message"),
+    ("layers", "options", "message"),
     [
-        (np.zeros((3, 4, 4)), r"transforms_to must have shape \(1, 4, 4\), got \(3, 4, 4\)"),
-        (np.full((4, 4), np.inf), "transforms_to must hold finite numbers"),
-        (np.ones((4, 4)), r"the last row of each of transforms_to must be \[0, 0, 0, 1\]"),
+        ("colour", {}, r"layers must be some of color, alpha, .* flow, got 'colour'"),
+        ("flow", {}, "layer 'flow' needs camera_to or transforms_to"),
+        ("uv", {}, "layer 'uv' needs a mesh that has texture coordinates"),
+        ("depth", {"attributes": {"depth": np.zeros(8)}}, "attributes must not have the name of a layer, got 'depth'"),
+        ("flow", {"transforms_to": np.zeros((3, 4, 4))}, r"transforms_to must have shape \(1, 4, 4\), got \(3, 4, 4\)"),
+        ("flow", {"transforms_to": np.full((4, 4), np.inf)}, "transforms_to must hold finite numbers"),
+        ("flow", {"transforms_to": np.ones((4, 4))}, r"the last row of each of transforms_to must be \[0, 0, 0, 1\]"),
     ],
 )
-def test_bad_transforms_are_refused(transforms, message):
+def test_layers_that_cannot_be_drawn_are_refused(layers, options, message):
     with pytest.raises(ValueError, match=message):
-        render_layers(CUBE, layers="flow", transforms_to=transforms)
+        render_layers(CUBE, size=(4, 3), layers=layers, **options)
 
 
 def test_unknown_option_is_refused():
