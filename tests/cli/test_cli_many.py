@@ -528,7 +528,7 @@ def topleft_with(method):
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg"), reason="needs process groups")
-@pytest.mark.parametrize(("jobs", "method"), [(1, None), *((2, method) for method in get_all_start_methods())])
+@pytest.mark.parametrize(("jobs", "method"), [(1, None), (2, "fork"), (2, "spawn")])
 def test_render_interrupted_leaves_whole_files_and_goes_on_with_resume(run, folder, jobs, method):
     meshes = ["octahedron", "tetrahedron"]
     options = ["--jobs", str(jobs), "-o", "p/", "--shading", "ids", *SMALL]
@@ -578,11 +578,11 @@ def is_running(pid):
         return False
 
 
-@pytest.fixture(params=get_all_start_methods())
-def many_pictures(request, folder):
+@contextlib.contextmanager
+def many_pictures(folder, method=None):
     """A run with two processes, once it has begun to write."""
     options = ["octahedron", "tetrahedron", "--jobs", "2", "-o", "p/", *SMALL, "--views", "4000"]
-    command = [sys.executable, *topleft_with(request.param), "render", *options]
+    command = [sys.executable, *topleft_with(method), "render", *options]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
         for _ in range(20_000):
             if len(list(folder.glob("p/[!.]*.png"))) >= 3 or process.poll() is not None:
@@ -593,30 +593,34 @@ def many_pictures(request, folder):
             os.killpg(process.pid, signal.SIGKILL)
 
 
-@pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGKILL"])
-def test_render_killed_takes_its_workers_along(many_pictures, name):
-    how = signal.Signals[name]
-    workers = workers_of(many_pictures.pid)
-    assert len(workers) >= 2
-    many_pictures.send_signal(how)
-    words = many_pictures.stderr.read()  # ends when nobody has it open
-    for _ in range(500):
-        if not any(map(is_running, workers)):
-            break
-        time.sleep(0.01)
-    assert not any(map(is_running, workers))
-    if how == signal.SIGTERM:
-        assert (many_pictures.wait(), words) == (143, "topleft: terminated\n")
+ENDS = [("SIGTERM", None), *(("SIGKILL", method) for method in get_all_start_methods())]
 
 
 @pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
-def test_render_whose_worker_is_killed_says_so_in_one_line(many_pictures):
-    os.kill(workers_of(many_pictures.pid)[0], signal.SIGKILL)
-    assert many_pictures.stderr.read() == (
-        "topleft: a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume\n"
-    )
-    assert many_pictures.wait() == 1
+@pytest.mark.parametrize(("name", "method"), ENDS)
+def test_render_killed_takes_its_workers_along(folder, name, method):
+    with many_pictures(folder, method) as run:
+        workers = workers_of(run.pid)
+        assert len(workers) >= 2
+        run.send_signal(signal.Signals[name])
+        words = run.stderr.read()  # ends when nobody has it open
+        for _ in range(500):
+            if not any(map(is_running, workers)):
+                break
+            time.sleep(0.01)
+        assert not any(map(is_running, workers))
+        if name == "SIGTERM":
+            assert (run.wait(), words) == (143, "topleft: terminated\n")
+
+
+@pytest.mark.skipif(not pathlib.Path("/proc/self/stat").exists(), reason="needs /proc")
+def test_render_whose_worker_is_killed_says_so_in_one_line(folder):
+    with many_pictures(folder) as run:
+        os.kill(workers_of(run.pid)[0], signal.SIGKILL)
+        assert run.stderr.read() == (
+            "topleft: a process that draws was killed, maybe for want of memory: try fewer --jobs, then --resume\n"
+        )
+        assert run.wait() == 1
 
 
 def test_render_removes_what_killed_runs_have_left_of_its_files(run, folder):
