@@ -51,6 +51,12 @@ def picture(path):
         return np.asarray(image)
 
 
+def assert_refused(run, words, *arguments):
+    """Check that `topleft mask` ends with status 2 and a line that holds these words."""
+    status, lines = run("mask", *arguments)
+    assert (status, len(lines), words in lines[0]) == (2, 1, True)
+
+
 def test_mask_of_geojson_has_y_up(files, run):
     assert run("mask", "map.geojson", "-o", "mask.png", "--size", "7x4", "--extent", 0, 7, 0, 4) == (0, [])
     grid = tl.Grid((7, 4), (0, 7, 0, 4))
@@ -87,10 +93,8 @@ def test_masks_of_each_image_of_coco(files, run):
 def test_one_image_of_coco(files, run):
     assert run("mask", "coco.json", "-o", "cat.npy", "--image", "cat", "--labels", "index") == (0, [])
     assert np.load("cat.npy").max() == 1
-    status, lines = run("mask", "coco.json", "-o", "cat.png")
-    assert (status, "coco.json has 2 images" in lines[0]) == (2, True)
-    status, lines = run("mask", "coco.json", "-o", "cat.png", "--image", "dog")
-    assert (status, "no image of that name" in lines[0]) == (2, True)
+    assert_refused(run, "coco.json has 2 images", "coco.json", "-o", "cat.png")
+    assert_refused(run, "no image of that name", "coco.json", "-o", "cat.png", "--image", "dog")
 
 
 def test_what_is_no_polygon_is_told(files, run):
@@ -208,10 +212,7 @@ def test_ring_without_area_of_geojson_is_left_out_and_the_rest_is_drawn(files, r
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"type": "FeatureCollection"}', '{"annotations": [1]}', "{"])
 def test_broken_files_are_refused_in_one_line(files, run, text):
     files.joinpath("bad.json").write_text(text)
-    status, lines = run("mask", "bad.json", "-o", "m.png")
-    assert status == 2
-    assert len(lines) == 1
-    assert "bad.json" in lines[0]
+    assert_refused(run, "bad.json", "bad.json", "-o", "m.png")
 
 
 def test_run_lengths_of_many_pixels_are_masks(files, run):
@@ -240,9 +241,8 @@ def images(files, *names):
 
 def test_images_of_one_name_in_two_folders_go_to_two_files(files, run):
     images(files, "a/1.jpg", "b/1.jpg")
-    status, lines = run("mask", "images.json", "-o", "e/{name}.png")
-    assert (status, len(lines)) == (2, 1)
-    assert "images a/1 and b/1 would both go to e/1.png; {folder} or {index} parts them" in lines[0]
+    said = "images a/1 and b/1 would both go to e/1.png; {folder} or {index} parts them"
+    assert_refused(run, said, "images.json", "-o", "e/{name}.png")
     assert not files.joinpath("e").exists()
     assert run("mask", "images.json", "-o", "e/{folder}/{name}.png") == (0, [])
     assert [picture(f"e/{name}/1.png").tolist() for name in "ab"] == [[[255, 0]], [[0, 255]]]
@@ -255,8 +255,7 @@ def test_images_of_one_name_in_two_folders_go_to_two_files(files, run):
 def test_images_of_one_id_are_refused(files, run):
     content = {**COCO, "images": [COCO["images"][0]] * 2}
     files.joinpath("twice.json").write_text(json.dumps(content))
-    status, lines = run("mask", "twice.json", "-o", "{name}.png")
-    assert (status, "1 ids of images stand more than once" in lines[0]) == (2, True)
+    assert_refused(run, "1 ids of images stand more than once", "twice.json", "-o", "{name}.png")
 
 
 def test_annotations_and_images_that_are_broken_are_left_out_and_told(files, run):
@@ -277,15 +276,13 @@ def test_annotations_and_images_that_are_broken_are_left_out_and_told(files, run
 @pytest.mark.parametrize("name", ["..", "a/..", "../../x.jpg", "/", "a\0b"])
 def test_images_outside_of_a_folder_are_refused(files, run, name):
     images(files, name)
-    status, lines = run("mask", "images.json", "-o", "masks/{name}/{folder}/mask.png")
-    assert (status, len(lines)) == (2, 1)
-    assert f"image 0 has the file name {name!r}, which is none within a folder" in lines[0]
+    said = f"image 0 has the file name {name!r}, which is none within a folder"
+    assert_refused(run, said, "images.json", "-o", "masks/{name}/{folder}/mask.png")
 
 
 def test_folder_of_an_image_with_a_whole_path_is_refused(files, run):
     images(files, "/data/1.jpg")
-    status, lines = run("mask", "images.json", "-o", "{folder}/{name}.png")
-    assert (status, "image 1 lies in /data, no folder within another" in lines[0]) == (2, True)
+    assert_refused(run, "image 1 lies in /data, no folder within another", "images.json", "-o", "{folder}/{name}.png")
     assert run("mask", "images.json", "-o", "{name}.png") == (0, [])
 
 
@@ -299,13 +296,9 @@ def test_image_without_a_name_is_its_number(files, run):
 def test_pipes_folders_and_devices_are_refused(files, run):
     os.mkfifo("pipe.json")
     files.joinpath("folder.json").mkdir()
-    for name, kind in (
-        ("pipe.json", "a pipe or a device"),
-        ("/dev/zero", "a pipe or a device"),
-        ("folder.json", "a folder"),
-    ):
-        status, lines = run("mask", name, "-o", "m.png")
-        assert (status, len(lines), f"{kind}, not a file" in lines[0]) == (2, 1, True)
+    for name in ("pipe.json", "/dev/zero"):
+        assert_refused(run, "a pipe or a device, not a file", name, "-o", "m.png")
+    assert_refused(run, "a folder, not a file", "folder.json", "-o", "m.png")
 
 
 def plane(files, points, **properties):
@@ -316,8 +309,7 @@ def plane(files, points, **properties):
 @pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e300, 10**400, 2**63, 1.5, None, ["3"]])
 def test_labels_that_are_no_whole_numbers_are_refused(files, run, value):
     plane(files, SQUARE, a=value)
-    status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
-    assert (status, len(lines), "has a whole number of 64 bits" in lines[0]) == (2, 1, True)
+    assert_refused(run, "has a whole number of 64 bits", "plane.json", "-o", "m.png", "--labels", "a")
 
 
 WHOLE = [0, 1, True, 3.0, -1, 65536, 2**31, 2**53 + 1, 2**63 - 1, -(2**63)]
@@ -343,8 +335,7 @@ def test_whole_numbers_keep_their_digits_beside_no_data(files, run, command, val
 def test_png_refuses_labels_that_it_does_not_hold(files, run):
     for value in (-1, 65536):
         plane(files, SQUARE, a=value)
-        status, lines = run("mask", "plane.json", "-o", "m.png", "--labels", "a")
-        assert (status, "PNG holds numbers from 0 to 65535" in lines[0]) == (2, True)
+        assert_refused(run, "PNG holds numbers from 0 to 65535", "plane.json", "-o", "m.png", "--labels", "a")
 
 
 def zones(files, *properties):
@@ -414,17 +405,15 @@ def test_planes_of_no_size_are_refused(files, run, far, said):
 
 def test_plane_that_is_too_large_for_numbers_is_refused_in_one_line(files, run):
     plane(files, [[-1.7e308, 0], [1.7e308, 0], [0, 1]])
-    status, lines = run("mask", "plane.json", "-o", "m.png")
-    assert (status, len(lines)) == (2, 1)
-    assert "reaches over inf x 1.0" in lines[0]
+    assert_refused(run, "reaches over inf x 1.0", "plane.json", "-o", "m.png")
 
 
 def test_rings_that_cross_too_often_are_refused_with_the_option(files, run):
     turns = 2.4 * np.arange(101)
     plane(files, np.stack([np.cos(turns), np.sin(turns)], axis=1).tolist())
     assert run("mask", "plane.json", "-o", "m.png", "--sampling", "area") == (0, [])
-    status, lines = run("mask", "plane.json", "-o", "m.png", "--sampling", "area", "--max-crossings", "3000")
-    assert (status, len(lines), "at most 3,000 times" in lines[0]) == (2, 1, True)
+    how = "--sampling", "area", "--max-crossings", "3000"
+    assert_refused(run, "at most 3,000 times", "plane.json", "-o", "m.png", *how)
 
 
 def test_extent_without_polygons_is_told(files, run):
@@ -554,8 +543,7 @@ def test_vector_file_that_is_broken_is_told_in_one_line(files, run):
     pytest.importorskip("pyogrio")
     pytest.importorskip("shapely")
     (files / "a.gpkg").write_bytes(b"SQLite")
-    status, lines = run("mask", "a.gpkg", "-o", "m.png")
-    assert (status, len(lines), lines[0].startswith("topleft: cannot read 'a.gpkg'")) == (2, 1, True)
+    assert_refused(run, "topleft: cannot read 'a.gpkg'", "a.gpkg", "-o", "m.png")
 
 
 def test_no_data_of_a_mask_is_refused(files, run):
@@ -606,9 +594,8 @@ def test_json_of_geojson_has_properties_and_the_grid_of_the_mask(files, run):
 
 def test_json_goes_with_neither_labels_nor_sampling(files, run):
     for option in (("--labels", "zone"), ("--sampling", "area")):
-        status, lines = run("mask", "map.geojson", "-o", "rle.json", *option)
-        assert status == 2
-        assert "run lengths are of masks, without --labels and --sampling" in lines[0]
+        said = "run lengths are of masks, without --labels and --sampling"
+        assert_refused(run, said, "map.geojson", "-o", "rle.json", *option)
 
 
 @pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
