@@ -128,11 +128,7 @@ def test_farthest_of_points_is_that_of_brute_force():
     one, other = soup(1, 40), soup(2, 60)
     points = points_on(corners(one), 3)
     # Both are float64: feet of needles are found in another order of operations.
-    assert other.farthest(points) == pytest.approx(farthest_by_force(points, corners(other)), rel=1e-9)
-
-
-def farthest_by_force(points, triangles):
-    return np.sqrt(largest_squared(points, triangles))
+    assert other.farthest(points) == pytest.approx(np.sqrt(largest_squared(points, corners(other))), rel=1e-9)
 
 
 def test_far_from_the_origin_the_margin_grows():

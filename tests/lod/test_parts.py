@@ -181,13 +181,6 @@ def test_parts_of_a_mesh_without_normals_are_lit_as_one(ground):
     assert np.array_equal(parts.normals[used], [of_place[tuple(place)] for place in parts.vertices[used]])
 
 
-def test_window_in_parts_is_the_crop_of_the_whole(ground):
-    whole = tl.rasterize_mesh(ground, ALONG, SIZE, tolerance=0.5)
-    part = tl.rasterize_mesh(ground, ALONG, (30, 20), tolerance=0.5, viewport=SIZE, origin=(40, 30))
-    assert np.array_equal(part.triangle, whole.triangle[30:50, 40:70])
-    assert np.array_equal(part.depth, whole.depth[30:50, 40:70])
-
-
 def test_parts_outside_of_the_picture_are_coarse(ground):
     aside = tl.Camera.look_at((0.5, 0.5, 0.05), (0.5, 0.9, 0.0), up=(0, 0, 1), fov_y_deg=40, near=1e-3)
     found = tl.choose_detail(ground, aside, (960, 640), tolerance=0.02)
@@ -221,13 +214,7 @@ def among_balls(mesh, *, n_before=3):
     return tl.Scene([*balls[:n_before], (mesh, aside), *balls[n_before:]]), aside
 
 
-SCENE_OPTIONS = [
-    {}, {"threads": 3}, {"sampling": "msaa4"}, {"depth_test": "greater"}, {"depth_test": None}, {"method": "edge"},
-    {"subpixel_bits": 4}, {"subpixel_bits": "exact"}, {"origin": (20, 30), "viewport": (192, 128)},
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("options", SCENE_OPTIONS, ids=str)
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
 @pytest.mark.parametrize("n_before", [0, 3, 8])
 def test_scene_in_parts_is_the_picture_of_their_mesh(ground, options, n_before):
     scene, aside = among_balls(ground, n_before=n_before)
