@@ -447,7 +447,7 @@ def test_gradients_of_weights_that_are_clamped():
     low, high, w = -0.624875, 0.62475, np.array([1, 2, 0.5])
     corners = np.array([[low, low], [high, low], [low, high]])
     quarter = np.array([[0.0, 1], [-1, 0]])
-    turns = [np.roll(corners @ np.linalg.matrix_power(quarter, k % 4), k, axis=0) for k in range(12)]
+    turns = [np.roll(corners @ np.linalg.matrix_power(quarter, k % 4), k, axis=0) for k in (0, 5, 10)]
     pos = torch.tensor(np.stack([np.c_[w[:, None] * turn, 0.1 * w**2, w] for turn in turns]), requires_grad=True)
 
     def run(pos):
@@ -455,7 +455,7 @@ def test_gradients_of_weights_that_are_clamped():
 
     u, v, _, number = run(pos)[0].detach().unbind(-1)
     for is_clamped in (u == 0, v == 0, u + v > 1 - 1e-9):
-        assert (is_clamped & (number > 0)).sum() > 12
+        assert (is_clamped & (number > 0)).sum() > 3
     assert torch.autograd.gradcheck(run, (pos,))
 
 
