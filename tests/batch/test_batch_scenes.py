@@ -227,7 +227,6 @@ def test_batch_layers_unknown_option_is_an_error_of_the_job(options):
 
 
 def test_spooled_mesh_comes_with_its_levels():
-    pytest.importorskip("fast_simplification")
     mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
     spool = crews.Spool()
     try:
@@ -241,7 +240,6 @@ def test_spooled_mesh_comes_with_its_levels():
 
 
 def test_batch_in_processes_draws_levels_of_the_parent(processes):
-    pytest.importorskip("fast_simplification")
     mesh = tl.Mesh(*tl.scenes.torus(segments=48, sections=24))
     found = list(tl.render_batch(views(3, mesh, tolerance=2), executor=processes))
     assert kept_levels(mesh) is not None

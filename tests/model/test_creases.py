@@ -260,7 +260,6 @@ def test_creases_show_through_a_lens():
 
 
 def test_levels_of_detail_crease_at_the_angle_of_their_mesh(tmp_path):
-    pytest.importorskip("fast_simplification")
     mesh = tl.Mesh(*tl.scenes.torus(), crease=40)
     levels = tl.simplify(mesh)
     levels.save(tmp_path / "levels.npz")

@@ -118,7 +118,6 @@ def test_accuracy_command_writes_what_report_prints(tmp_path, capsys):
 
 
 def test_charts_command_draws_svg(tiny, tmp_path, capsys):
-    pytest.importorskip("matplotlib")
     some = tiny | {"families": tiny["families"][:1]}
     (tmp_path / "tiny.json").write_text(json.dumps(some))
     assert cli.main(["charts", str(tmp_path / "tiny.json"), "-o", str(tmp_path / "images")]) == 0
@@ -127,7 +126,6 @@ def test_charts_command_draws_svg(tiny, tmp_path, capsys):
 
 
 def test_pareto_front_keeps_what_nothing_beats():
-    pytest.importorskip("matplotlib")
     from benchmarks.accuracy.charts import pareto_front
 
     assert list(pareto_front([(3, 1), (1, 5), (2, 6), (4, 1), (2, 4)])) == [(1, 5), (2, 4), (3, 1)]

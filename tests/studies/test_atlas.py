@@ -142,7 +142,6 @@ def test_atlas_command_writes_what_report_prints(tmp_path, capsys):
 
 
 def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
-    pytest.importorskip("matplotlib")
     from benchmarks.atlas import charts as atlas_charts
     from matplotlib import pyplot as plt
 
@@ -159,7 +158,6 @@ def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
 
 
 def test_magnified_pictures_show_each_wrong_picture_once():
-    pytest.importorskip("matplotlib")
     from benchmarks.atlas import magnified as atlas_pictures
 
     families = {family for group in atlas_pictures.SHEETS.values() for family in group}

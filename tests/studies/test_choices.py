@@ -21,7 +21,6 @@ TINY = bench.ChoiceOptions(scenes=list(FIRST.values()), rounds=1, seconds=0.0, s
 @pytest.fixture(scope="module")
 def record():
     """Every choice and the first scenes of each kind, at a fiftieth of the size."""
-    pytest.importorskip("scipy")
     return bench.run_choices(TINY)
 
 
@@ -100,7 +99,6 @@ def test_tables_hold_each_choice_and_scene(record):
 
 
 def test_chart_has_a_row_for_each_choice(record, tmp_path):
-    pytest.importorskip("matplotlib")
     from benchmarks.choices.charts import chart_choices, draw_charts
 
     labels = [label.get_text() for label in chart_choices(record).axes[0].get_yticklabels()]

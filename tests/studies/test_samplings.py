@@ -1,6 +1,5 @@
 """The picture of one scene in every sampling."""
 
-import pytest
 from benchmarks import cli
 from PIL import Image
 
@@ -8,7 +7,6 @@ from topleft._core.base.options import Sampling
 
 
 def test_samplings_command_draws_a_panel_for_each(tmp_path, capsys):
-    pytest.importorskip("matplotlib")
     from benchmarks.small.samplings import ORDER
 
     assert sorted(ORDER) == sorted(Sampling)

@@ -128,7 +128,6 @@ def test_kind_of_scene_is_told_by_its_slowest_and_fastest():
 
 
 def test_chart_has_a_row_for_each_other_scene(record, tmp_path):
-    pytest.importorskip("matplotlib")
     from benchmarks.static.charts import chart_static, draw_charts
 
     first, second, others = chart_static(record).axes
