@@ -5,13 +5,13 @@ from math import gcd
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, cases, check_all, exact_picture, mixed, on
+from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, cases, check_all, exact_picture, mixed, on, one_by_one
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
 from topleft import scenes
 
-BITS = pytest.mark.parametrize("bits", [0, 1, 4, 7, 8, 9, 12, 15, 16])
+BITS = one_by_one("bits", [0, 1, 4, 7, 8, 9, 12, 15, 16])
 
 # ---- the timed scenes -----------------------------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ def twenty_thousand(seed):
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("seed", MIXED)
+@one_by_one("seed", MIXED)
 def test_engine_mixed_triangles_equal_exact_picture(seed, isa):
     check_all(isa, cases(twenty_thousand, seed), (1, 3))
 
@@ -223,7 +223,7 @@ def test_engine_vertices_at_the_end_of_64_bits_equal_exact_picture(bits, isa):
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("bits", [0, 8, 16])
+@one_by_one("bits", [0, 8, 16])
 @pytest.mark.parametrize("edge_px", [2**15, 2**22, 2**30, 2**31])
 def test_engine_windows_at_limits_equal_exact_picture(edge_px, bits, isa):
     check_all(isa, cases(windows_at, edge_px, bits))

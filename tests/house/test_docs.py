@@ -4,7 +4,7 @@ import ast
 import re
 from pathlib import Path
 
-import pytest
+from engine_cases import one_by_one
 
 import topleft as tl
 from topleft._meshes.io.limits.budget import LIMITS
@@ -37,14 +37,14 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", CHECKED, ids=lambda page: page.relative_to(ROOT).as_posix())
+@one_by_one("page", CHECKED)
 def test_links_lead_to_files_and_headings_that_exist(page):
     found = links(page)
     assert [path.relative_to(ROOT).as_posix() for path, _ in found if not path.exists()] == []
     assert [f"{path.name}#{part}" for path, part in found if part and part not in anchors(path)] == []
 
 
-@pytest.mark.parametrize("page", [*FRONT, *PAGES], ids=lambda page: page.relative_to(ROOT).as_posix())
+@one_by_one("page", [*FRONT, *PAGES])
 def test_page_has_a_title_and_a_first_sentence(page):
     title, blank, first = page.read_text(encoding="utf-8").split("\n", 3)[:3]
     assert title.startswith("# ")
@@ -52,7 +52,7 @@ def test_page_has_a_title_and_a_first_sentence(page):
     assert re.match(r"[\[`*\w]", first)
 
 
-@pytest.mark.parametrize("page", CHECKED, ids=lambda page: page.relative_to(ROOT).as_posix())
+@one_by_one("page", CHECKED)
 def test_powers_outside_code_are_not_read_as_bold(page):
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     assert re.findall(r"(?m)^(?!    ).*\d\*\*-?\d.*$", text) == []  # 2**62 to 2**30 shows as a bold "62 to 2"
@@ -75,7 +75,7 @@ def test_every_picture_is_shown_by_a_page():
     assert [path.name for path in sorted(DOCS.joinpath("images").iterdir()) if path not in shown] == []
 
 
-@pytest.mark.parametrize("page", [*FRONT, *PAGES], ids=lambda page: page.relative_to(ROOT).as_posix())
+@one_by_one("page", [*FRONT, *PAGES])
 def test_source_files_that_a_page_names_exist(page):
     named = {name for code in CODE.findall(page.read_text(encoding="utf-8")) for name in NAMED.findall(code)}
     named -= {name for name in named if re.search(r"NAME|Python\.h|\.ci/", name)}  # to be filled in; not in an sdist

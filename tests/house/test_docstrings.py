@@ -7,6 +7,7 @@ from inspect import cleandoc, ismodule
 from pathlib import Path
 
 import pytest
+from engine_cases import one_by_one
 
 import topleft as tl
 
@@ -50,7 +51,7 @@ def public_docstrings():
     return {name: cleandoc(thing.__doc__ or "") for name, thing in found.items() if not ismodule(thing)}
 
 
-@pytest.mark.parametrize("name", sorted(public_docstrings()))
+@one_by_one("name", sorted(public_docstrings()))
 def test_public_name_has_an_example_that_runs(name):
     """The test above runs it."""
     assert "\nExamples\n--------\n" in public_docstrings()[name]

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from engine_cases import one_by_one
 
 import topleft as tl
 from topleft._core.engine import kernels
@@ -99,7 +100,7 @@ def test_no_public_name_is_that_of_a_module_but_scenes():
     assert [name for name in tl.__all__ if find_spec(f"topleft.{name}")] == ["scenes"]
 
 
-@pytest.mark.parametrize("name", PUBLIC)
+@one_by_one("name", PUBLIC)
 def test_public_name_is_of_topleft_and_can_be_pickled_and_looked_into(name):
     value = getattr(tl, name)
     assert value.__module__ == "topleft"
@@ -197,7 +198,7 @@ def test_private_names_stay_in_their_file():
 # Rooms
 
 
-@pytest.mark.parametrize("room", ROOMS, ids=short)
+@one_by_one("room", ROOMS)
 def test_room_says_what_it_is_and_lists_no_files(room):
     lines = facts(room / "__init__.py").head.splitlines()
     assert lines

@@ -6,6 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 from gltf_files import QUAD, TRIANGLE, GltfFile, glb_of
 
 import topleft as tl
@@ -181,7 +182,7 @@ UNREAD = [
 
 
 @pytest.mark.parametrize("read", [tl.load, tl.load_cameras])
-@pytest.mark.parametrize("name", UNREAD)
+@one_by_one("name", UNREAD)
 def test_gltf_extension_that_is_required_and_not_read_is_refused_by_name(tmp_path, name, read):
     file = GltfFile(extensionsUsed=[name], extensionsRequired=["KHR_mesh_quantization", name]).shown()
     (tmp_path / "a.glb").write_bytes(file.glb())
@@ -189,7 +190,7 @@ def test_gltf_extension_that_is_required_and_not_read_is_refused_by_name(tmp_pat
         read(tmp_path / "a.glb")
 
 
-@pytest.mark.parametrize("name", UNREAD)
+@one_by_one("name", UNREAD)
 def test_gltf_extension_that_is_used_and_not_required_is_drawn_without_it(tmp_path, name):
     (tmp_path / "a.glb").write_bytes(GltfFile(extensionsUsed=[name]).shown().glb())
     with warnings.catch_warnings(record=True):

@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, one_by_one
 from PIL import Image
 
 import topleft as tl
@@ -39,7 +39,7 @@ def chunks_of(data):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize(("channels", "mode"), [((), "L"), ((2,), "LA"), ((3,), "RGB"), ((4,), "RGBA")])
-@pytest.mark.parametrize("size", [(1, 1), (1, 300), (300, 1), (37, 53)])
+@one_by_one("size", [(1, 1), (1, 300), (300, 1), (37, 53)])
 def test_encode_bytes_come_back(isa, channels, mode, size):
     image = np.random.default_rng(1).integers(0, 256, (*size, *channels), dtype=np.uint8)
     with on(isa):

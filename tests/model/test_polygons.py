@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, one_by_one
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -54,7 +54,7 @@ def test_triangulate_faces_of_all_sizes_keep_their_order():
     assert corners[triangles[-1]].tolist() == [4, 1, 0]
 
 
-@pytest.mark.parametrize("seed", range(40))
+@one_by_one("seed", range(40))
 def test_triangulate_stars_in_space_cover_themselves(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(4, 60))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 
 from topleft.scene_families import FAMILIES, HUBS
 
@@ -17,7 +18,7 @@ def test_hub_outside_lies_left_of_the_frame_by_the_distance_in_its_name(name):
     assert HUBS[name] == (-float(name.removesuffix(" px")), 0)
 
 
-@pytest.mark.parametrize("hub", HUBS)
+@one_by_one("hub", HUBS)
 def test_fan_has_as_many_triangles_as_it_says(hub):
     assert len(FAMILIES["hub"].make(HUBS[hub], 0).triangles) == 32
     for n in (4, 64):
@@ -30,7 +31,7 @@ def test_fan_in_the_frame_has_as_many_triangles_as_its_name(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", FAMILIES)
+@one_by_one("name", FAMILIES)
 def test_triangles_of_a_family_turn_one_way(name, seed):
     family = FAMILIES[name]
     scene = family.make(*(next(iter(axis.values.values())) for axis in family.axes), seed)

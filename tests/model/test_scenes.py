@@ -5,6 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 
 from topleft import scenes
 
@@ -40,7 +41,6 @@ def test_random_triangles_lie_within_their_circle():
 
 
 def test_planar_mesh_covers_the_frame_once():
-    pytest.importorskip("scipy")
     vertices, triangles = scenes.planar_mesh(50, 64, 48)
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     twice_area = np.abs(np.cross(np.pad(b - a, ((0, 0), (0, 1))), np.pad(c - a, ((0, 0), (0, 1))))[:, 2])
@@ -64,21 +64,21 @@ def test_to_clip_applies_the_matrix_to_columns():
     assert scenes.to_clip(np.array([[1.0, 2.0, 3.0]]), matrix).tolist() == [(matrix @ [1, 2, 3, 1]).tolist()]
 
 
-@pytest.mark.parametrize("name", CLOSED)
+@one_by_one("name", CLOSED)
 def test_shape_is_closed_and_consistently_wound(name):
     edges = directed_edges(*scenes.shape(name))
     assert set(edges.values()) == {1}
     assert all((b, a) in edges for a, b in edges)
 
 
-@pytest.mark.parametrize("name", CLOSED)
+@one_by_one("name", CLOSED)
 def test_shape_faces_outward(name):
     vertices, triangles = scenes.shape(name)
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     assert (a * np.cross(b, c)).sum() > 0  # six times the volume
 
 
-@pytest.mark.parametrize("name", CLOSED)
+@one_by_one("name", CLOSED)
 def test_shape_has_no_empty_triangle_and_no_spare_vertex(name):
     vertices, triangles = scenes.shape(name)
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))

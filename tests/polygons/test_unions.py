@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 from PIL import Image
 
 import topleft as tl
@@ -51,7 +52,7 @@ def of_shapely(form):
 FORMS = [multi, collection, of_shapely(multi), of_shapely(collection)]
 
 
-@pytest.mark.parametrize("form", FORMS)
+@one_by_one("form", FORMS)
 @pytest.mark.parametrize("name", PARTS)
 @pytest.mark.parametrize("rule", ["evenodd", "nonzero"])
 def test_parts_of_a_geometry_are_united_by_each_verb(name, form, rule):

@@ -5,6 +5,7 @@ from math import gcd
 import comparing
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import (
@@ -71,7 +72,7 @@ def test_overdraw_at_the_border_of_narrow_vertices_equals_reference(dtype, bits)
         comparing.check_overdraw(soup(xy, (12, 12), subpixel_bits=bits))
 
 
-@pytest.mark.parametrize("bits", range(17))
+@one_by_one("bits", range(17))
 def test_overdraw_each_number_of_bits_equals_reference(bits):
     xy = np.random.default_rng(bits).uniform(-6, 18, (90, 2))
     comparing.check_overdraw(soup(xy, (12, 12), subpixel_bits=bits))

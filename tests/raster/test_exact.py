@@ -3,7 +3,7 @@
 import comparing
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on, sharing
+from engine_cases import ON_EACH_ISA, on, one_by_one, sharing
 from exact_cases import BITING_EDGES, KETTNER_A1, SIZE, exact_scenes, kettner_grid, lattice, tilted_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -163,7 +163,7 @@ def test_shewchuk_tilted_grid_covers_each_pixel_once(isa, step):
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("side", [1 / 3, 1, 2, 3, 7, 13, 40])
+@one_by_one("side", [1 / 3, 1, 2, 3, 7, 13, 40])
 @pytest.mark.parametrize("n_steps", [0, 2])
 def test_lattice_on_centres_covers_each_pixel_once(isa, side, n_steps):
     vertices, triangles = lattice(side, 0.5, n_steps, np.random.default_rng(5))

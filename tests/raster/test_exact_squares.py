@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, kept, on, one_by_one
 from exact_cases import exact_scenes
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,7 +12,7 @@ import topleft as tl
 from topleft.methods.reference import sampling
 
 EXACT = {"subpixel_bits": "exact"}
-SQUARES = {"outer": sampling.outer, "inner": sampling.inner}
+SQUARES = {"outer": kept(sampling.outer), "inner": kept(sampling.inner)}
 
 
 def count(scene, kind, **view):
@@ -50,7 +50,7 @@ def test_window_of_squares_holds_the_crop(isa, scene, x, y, width):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("kind", SQUARES)
-@pytest.mark.parametrize("side", [0.75, 3, 11, 30, 61, 90])
+@one_by_one("side", [0.75, 3, 11, 30, 61, 90])
 def test_squares_of_all_sizes_are_those_of_the_reference(isa, kind, side):
     """Lanes for boxes of up to 4x4, 16x16 and 62x62 pixels, and triangles by themselves."""
     rng = np.random.default_rng(int(side * 4))

@@ -3,7 +3,7 @@
 import comparing
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, kept, on, one_by_one
 from exact_cases import exact_scenes
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +16,7 @@ from topleft.methods.reference import peel as ref_peel
 
 EXACT = {"subpixel_bits": "exact"}
 MODES = ["replace", "over", "add", "multiply", "max", "min"]
+fill, blend = kept(reference.fill), kept(ref_blend.blend)
 
 
 def colors_of(n, n_channels, seed, dtype=np.uint8):
@@ -33,7 +34,7 @@ def colors_of(n, n_channels, seed, dtype=np.uint8):
 @given(scene=exact_scenes(), seed=st.integers(0, 99))
 def test_colors_of_vertices_are_rounded_as_the_reference_rounds_them(isa, scene, seed):
     colors = colors_of(len(scene.vertices), 3, seed)
-    expected = reference.fill(*scene.arrays[:2], colors, scene.size, per="vertex", **scene.view)
+    expected = fill(*scene.arrays[:2], colors, scene.size, per="vertex", **scene.view)
     with on(isa):
         found = tl.fill(*scene.arrays[:2], colors, scene.size, per="vertex", **scene.view)
     assert (found == expected).all()
@@ -74,7 +75,7 @@ def test_colors_of_vertices_in_clip_space_are_those_of_the_reference(make):
 def test_blended_colors_are_those_of_the_reference(isa, per, scene, seed, mode):
     n = len(scene.triangles if per == "triangle" else scene.vertices)
     colors, options = colors_of(n, 4, seed), {"per": per, "background": 77}
-    expected = ref_blend.blend(*scene.arrays[:2], colors, scene.size, mode=mode, **options, **scene.view)
+    expected = blend(*scene.arrays[:2], colors, scene.size, mode=mode, **options, **scene.view)
     with on(isa):
         found = tl.fill(*scene.arrays[:2], colors, scene.size, blend=mode, **options, **scene.view)
     assert (found == expected).all()
@@ -106,7 +107,7 @@ def test_samples_of_colors_are_the_mean_of_pictures(per, mode):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("on_grid", [False, True])
-@pytest.mark.parametrize("side", [0.75, 3, 11, 40, 61, 130])
+@one_by_one("side", [0.75, 3, 11, 40, 61, 130])
 def test_ones_that_add_up_count_the_triangles(isa, side, on_grid):
     """Queues of triangles of all sizes, those that lanes cannot take between them, in windows and on threads."""
     rng = np.random.default_rng(int(side * 4))

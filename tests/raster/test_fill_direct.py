@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 
 import topleft as tl
 from topleft.scenes import random_triangles
@@ -18,7 +19,7 @@ def few_triangles(n: int, channels: int):
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
-@pytest.mark.parametrize("n", [1, 5, 63, 64, 300])
+@one_by_one("n", [1, 5, 63, 64, 300])
 def test_fill_of_few_triangles_shows_the_later_one(n, channels):
     vertices, triangles, colors = few_triangles(n, channels)
     ids = tl.rasterize(vertices, triangles, SIZE).triangle

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
-from engine_cases import ON_EACH_ISA, THREADS, assert_same_everywhere, on
+from engine_cases import ON_EACH_ISA, THREADS, assert_same_everywhere, kept, on, one_by_one
 from strategies import CLIP_SCENES, PIXEL_SCENES, soup, with_depth
 
 import topleft as tl
@@ -15,6 +15,7 @@ from topleft.methods.reference import lines as ref
 
 TRIANGLE = [[0.5, 0.5], [4.5, 0.5], [0.5, 4.5]]
 ONE = [[0, 1, 2]]
+wireframe, smooth_wireframe = kept(ref.wireframe), kept(ref.smooth_wireframe)
 COVERAGE_SLACK = 2.0**-23  # float64 from exact integers; float32 rounds the square, its root and the difference
 
 
@@ -79,11 +80,11 @@ def test_textbook_loop_may_start_anywhere():
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("name", [*PIXEL_SCENES, *CLIP_SCENES])
+@one_by_one("name", [*PIXEL_SCENES, *CLIP_SCENES])
 def test_wireframe_equals_reference(name, isa):
     for seed in range(6):
         scene = (PIXEL_SCENES | CLIP_SCENES)[name](np.random.default_rng(seed))
-        expected = ref.wireframe(*scene.arrays, **scene.view)
+        expected = wireframe(*scene.arrays, **scene.view)
         with on(isa):
             for n in THREADS:
                 assert_exact(tl.wireframe(*scene.arrays, threads=n, **scene.view), expected)
@@ -99,7 +100,7 @@ def test_wireframe_lines_of_any_length_equal_reference(reach, isa):
         middle = np.multiply(origin, rng.integers(0, 2)) + rng.uniform(0, 100, (60, 2))
         xy = middle + rng.uniform(-reach, reach, (60, 2))
         scene = soup(xy, size, origin=origin, cull=str(rng.choice(["none", "back", "front"])))
-        expected = ref.wireframe(*scene.arrays, **scene.view)
+        expected = wireframe(*scene.arrays, **scene.view)
         with on(isa):
             assert_exact(tl.wireframe(*scene.arrays, threads=3, **scene.view), expected)
 
@@ -118,7 +119,7 @@ def test_wireframe_at_the_limits_of_fixed_point_equals_reference(bits):
 def test_antialiased_equals_exact_distances(isa):
     for name in ("few_bits", "slivers", "snap_degenerates", "window_of_soup", "clip_soup", "floor"):
         scene = (PIXEL_SCENES | CLIP_SCENES)[name](np.random.default_rng(1), 6)
-        exact = ref.smooth_wireframe(*scene.arrays, **scene.view)
+        exact = smooth_wireframe(*scene.arrays, **scene.view)
         with on(isa):
             got = tl.wireframe(*scene.arrays, antialias=True, **scene.view)
         assert got.dtype == np.float32

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import assert_same, assert_same_buffers, buffers
-from engine_cases import ON_EACH_ISA, on, sharing
+from engine_cases import ON_EACH_ISA, on, one_by_one, sharing
 from hypothesis import given
 from strategies import CLIP_SCENES, PIXEL_SCENES, clip_scenes, jittered_grid, pixel_scenes, soup, with_depth
 
@@ -180,9 +180,7 @@ def test_any_layout_gives_the_same_picture_and_is_not_modified(make):
         assert (np.array_equal(vertices, before[0]), np.array_equal(corners[name], before[1])) == (True, True)
 
 
-@pytest.mark.parametrize(
-    "dtype", ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">f4", ">i2", ">u8"]
-)
+@one_by_one("dtype", ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8", ">f4", ">i2", ">u8"])
 @pytest.mark.parametrize("n_components", [2, 3, 4])
 def test_any_vertex_dtype_gives_the_same_picture(dtype, n_components):
     rng = np.random.default_rng(2)

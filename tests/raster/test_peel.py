@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
-from engine_cases import ON_EACH_ISA, THREADS, assert_same_everywhere, mixed, on
+from engine_cases import ON_EACH_ISA, THREADS, assert_same_everywhere, kept, mixed, on
 from strategies import CLIP_SCENES, PIXEL_SCENES, with_depth
 
 import topleft as tl
@@ -11,8 +11,10 @@ from topleft._core.raster import peel as peel_module
 from topleft.methods.reference import peel as ref
 
 LAST = {"less": np.inf, "greater": -np.inf}
+layers = kept(ref.layers)
 
 
+@kept
 def one_by_one(scene, depth_test, n):
     """The layers by definition: each triangle drawn alone, then all samples of a pixel sorted."""
     drawn = [
@@ -33,7 +35,7 @@ def one_by_one(scene, depth_test, n):
 def test_peel_ids_and_depths_are_those_of_the_reference(isa, name, depth_test):
     rng = np.random.default_rng(5)
     scene = with_depth(PIXEL_SCENES[name](rng), rng, flat=True)
-    expected = ref.layers(*scene.arrays, 5, depth_test=depth_test, **scene.view)
+    expected = layers(*scene.arrays, 5, depth_test=depth_test, **scene.view)
     with on(isa):
         got = tl.peel(*scene.arrays, layers=5, depth_test=depth_test, **scene.view)
     assert_exact(got.triangle, expected[0])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, on
+from engine_cases import ON_EACH_ISA, THREADS, on, one_by_one
 from scene_cases import CAMERA, CUBE, SIZE, SPHERE, joined, many, told_apart
 
 import topleft as tl
@@ -296,7 +296,7 @@ BALLS = [tl.Mesh(vertices.astype(dtype), triangles)
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("most_ids", [2**31 - 1, 5000, 1500])
-@pytest.mark.parametrize("seed", range(6))
+@one_by_one("seed", range(6))
 def test_instances_in_rounds_and_groups_are_drawn_as_one_after_the_other(isa, seed, most_ids, monkeypatch, force):
     rng = np.random.default_rng(seed)
     standing, camera = random_scene(rng)

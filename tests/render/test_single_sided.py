@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from comparing import assert_same
+from engine_cases import one_by_one
 
 import topleft as tl
 
@@ -92,7 +93,7 @@ PICTURES = {
 }
 
 
-@pytest.mark.parametrize("cull", ["none", "back", "front"])
+@one_by_one("cull", ["none", "back", "front"])
 @pytest.mark.parametrize("draw", PICTURES.values(), ids=PICTURES)
 def test_a_side_that_is_named_wins_over_the_materials(draw, cull):
     assert_same(draw(MIXED, cull), draw(BOTH_SIDES, cull))

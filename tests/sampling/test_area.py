@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on
+from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on, one_by_one
 from strategies import Scene, needles, perspective, soup
 
 import topleft as tl
@@ -127,7 +127,7 @@ def cached_layers(key, scene):
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("n", [1, 191, 192, 193, 255, 256, 4095, 4096, 65535, 65536])
+@one_by_one("n", [1, 191, 192, 193, 255, 256, 4095, 4096, 65535, 65536])
 def test_area_of_equal_layers_is_a_multiple(n, isa):
     one = soup([[0.3, -9], [4.6, 0], [0.7, 40]], (5, 3))
     many = Scene(one.vertices, np.repeat(one.triangles, n, 0), one.size)

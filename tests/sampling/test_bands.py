@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, one_by_one
 
 import topleft as tl
 from topleft._core import engine
@@ -173,8 +173,8 @@ SHAPES = {
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("blend", ["over", "replace", "multiply", "max"])
+@one_by_one("shape", SHAPES)
+@one_by_one("blend", ["over", "replace", "multiply", "max"])
 def test_large_triangles_by_area(isa, shape, blend):
     """A flat triangle has the bits of one whose vertices have that colour, which takes another way."""
     rng = np.random.default_rng(2)

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from comparing import assert_exact, assert_same
-from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on
+from engine_cases import ON_EACH_ISA, assert_same_everywhere, mixed, on, one_by_one
 from strategies import Scene, perspective, soup
 
 import topleft as tl
@@ -66,7 +66,7 @@ def expected_by_samples(mode, alpha, n_channels, dtype):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+@one_by_one(("mode", "alpha", "n_channels"), CASES)
 def test_blend_flat_equals_reference(mode, alpha, n_channels, dtype, isa):
     for scene, colors, ground, expected in expected_by_samples(mode, alpha, n_channels, dtype):
         for method in ("auto", "edge"):
@@ -97,7 +97,7 @@ def expected_by_areas(mode, alpha, n_channels, dtype):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+@one_by_one(("mode", "alpha", "n_channels"), CASES)
 def test_blend_by_area_equals_reference(mode, alpha, n_channels, dtype, isa):
     for scene, colors, ground, expected in expected_by_areas(mode, alpha, n_channels, dtype):
         with on(isa):
@@ -314,7 +314,7 @@ def mean_by_samples(mode, alpha, n_channels, dtype):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-@pytest.mark.parametrize(("mode", "alpha", "n_channels"), CASES)
+@one_by_one(("mode", "alpha", "n_channels"), CASES)
 def test_blend_of_samples_is_the_mean_of_pictures_by_samples(mode, alpha, n_channels, dtype, isa):
     arrays, options, expected = mean_by_samples(mode, alpha, n_channels, dtype)
     for threads in (1, 3):

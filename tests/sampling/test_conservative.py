@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, sharing
+from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, one_by_one, sharing
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, soup
 
 import topleft as tl
@@ -51,7 +51,7 @@ def test_squares_are_those_of_the_reference(isa, name):
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("bits", range(17))
+@one_by_one("bits", range(17))
 def test_squares_each_precision_are_those_of_the_reference(isa, bits):
     rng = np.random.default_rng(bits)
     with on(isa):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from engine_cases import one_by_one
 
 import topleft as tl
 
@@ -47,7 +48,7 @@ def assert_few_equal_many(vertices: object, colors: np.ndarray, **options: objec
 
 
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa4", "msaa8", "msaa16"])
-@pytest.mark.parametrize("shape", SHAPES)
+@one_by_one("shape", SHAPES)
 def test_fill_of_few_triangles_equals_that_of_many(shape, sampling):
     assert_few_equal_many(SHAPES[shape], palette(1, 4, np.uint8), sampling=sampling)
 
@@ -64,7 +65,7 @@ def test_blend_of_few_triangles_equals_that_of_many(blend, dtype):
                 assert_few_equal_many(two_triangles(), colors, background=background, blend=blend, alpha=alpha)
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@one_by_one("shape", SHAPES)
 @pytest.mark.parametrize("size", [SIZE, (800, 333), (61, 3000)])
 def test_areas_of_few_triangles_equal_those_of_many(shape, size):
     few, many = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))
@@ -73,7 +74,7 @@ def test_areas_of_few_triangles_equal_those_of_many(shape, size):
 
 
 @pytest.mark.parametrize("blend", ["replace", "over", "add", "multiply"])
-@pytest.mark.parametrize("shape", SHAPES)
+@one_by_one("shape", SHAPES)
 def test_fill_by_area_over_a_background_equals_one_over_a_picture(shape, blend):
     """The same over a background as over a picture, and whole as by windows that are too narrow for runs."""
     vertices, triangles = meshes(np.concatenate([SHAPES[shape], SHAPES["level"]]))[0]

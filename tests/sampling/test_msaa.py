@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, sharing
+from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, one_by_one, sharing
 from pages import before_a_page, behind_a_page
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
 
@@ -61,7 +61,7 @@ def test_coverage_is_the_share_of_samples_of_the_reference(isa, name):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("n", COUNTS)
-@pytest.mark.parametrize("bits", [0, 1, 2, 3, 4, 5, 8, 9, 16])
+@one_by_one("bits", [0, 1, 2, 3, 4, 5, 8, 9, 16])
 def test_coverage_each_precision_is_that_of_the_reference(isa, n, bits):
     rng = np.random.default_rng(bits)
     with on(isa):

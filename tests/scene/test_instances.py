@@ -6,7 +6,7 @@ import numpy as np
 import picture_cases as cases
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, one_by_one
 
 import topleft as tl
 from topleft._core import engine
@@ -78,7 +78,7 @@ def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, m
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("seed", range(20))
+@one_by_one("seed", range(20))
 def test_scene_is_drawn_as_its_instances_alone(isa, seed, monkeypatch):
     monkeypatch.setattr(draw_scene, "FIRST_ROUND", 2)
     rng = np.random.default_rng(seed)

@@ -1,9 +1,10 @@
 """What the engine must draw, and whether it does: on one instruction set and another, with any number of threads."""
 
+import inspect
 import pickle
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, wraps
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,36 @@ from topleft.methods.reference.integers import ExactPicture, projected, snapped
 THREADS = (1, 2, 3, 8)
 DEPTH_TESTS = ("less", "greater", None)
 
-#: Stands above all other marks: pytest then draws a scene on each instruction set before it makes the next.
-ON_EACH_ISA = pytest.mark.parametrize("isa", tl.build_info()["isa_available"])
+
+def one_by_one(names, values):
+    """A mark as `pytest.mark.parametrize`, of one test that takes each value in turn and notes which one failed.
+
+    What a value has patched or forced is undone before the next.
+    """
+    names, rows = ((names,), [(value,) for value in values]) if isinstance(names, str) else (names, values)
+
+    def mark(test):
+        @wraps(test)
+        def in_turn(**options):
+            for row in rows:
+                with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
+                    own = {"monkeypatch": patch, "force": lambda **kw: stack.enter_context(choices.forced(**kw))}
+                    given = dict(zip(names, row, strict=True))
+                    try:
+                        test(**options | {key: own[key] for key in own.keys() & options.keys()} | given)
+                    except BaseException as error:
+                        error.add_note(f"with {given}")
+                        raise
+
+        signature = inspect.signature(test)
+        others = [each for each in signature.parameters.values() if each.name not in names]
+        in_turn.__signature__ = signature.replace(parameters=others)
+        return in_turn
+
+    return mark
+
+
+ON_EACH_ISA = one_by_one("isa", tl.build_info()["isa_available"])
 
 
 def kept(exact):

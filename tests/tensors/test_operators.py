@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from engine_cases import ON_EACH_ISA, on
+from engine_cases import ON_EACH_ISA, on, one_by_one
 
 torch = pytest.importorskip("torch")
 
@@ -175,7 +175,7 @@ def test_rast_is_copied_and_saved_as_any_tensor():
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("rule", EDGES)
-@pytest.mark.parametrize("other", [2**31 - 1, -(2**31), 10**9])
+@one_by_one("other", [2**31 - 1, -(2**31), 10**9])
 def test_what_lies_across_edges_may_change_once_the_outline_is_known(isa, rule, other):
     pos, tri, colours = (one.numpy() for one in sphere(level=2))
     grid, ids = PixelGrid(tri, 1, 40, 50), [tl.rasterize(pos[0], tri, (50, 40)).triangle]
