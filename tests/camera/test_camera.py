@@ -338,24 +338,16 @@ def test_off_center_halves_make_the_whole(ortho):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: Camera.off_center(np.eye(4), left=1, right=1, bottom=0, top=1, near=1, far=2),
-            "left < right and bottom < top must be finite, got 1 and 1, 0 and 1",
-        ),
-        (
-            lambda: Camera.off_center(np.eye(4), left=0, right=1, bottom=0, top=1, near=-1, far=2),
-            "0 < near < far, got -1 and 2",
-        ),
-        (
-            lambda: Camera.off_center(np.eye(4), left=0, right=np.inf, bottom=0, top=1, near=1, far=2, ortho=True),
-            "left < right and bottom < top must be finite, got 0 and inf",
-        ),
-        (
-            lambda: Camera.framing([(0, 0, 0)], fit="tight"),
-            "fit must be one of 'sphere', 'box', 'points', 'silhouette', got 'tight'",
-        ),
+        (lambda: Camera.off_center(np.eye(4), left=1, right=1, bottom=0, top=1, near=1, far=2),
+         "left < right and bottom < top must be finite, got 1 and 1, 0 and 1"),
+        (lambda: Camera.off_center(np.eye(4), left=0, right=1, bottom=0, top=1, near=-1, far=2),
+         "0 < near < far, got -1 and 2"),
+        (lambda: Camera.off_center(np.eye(4), left=0, right=np.inf, bottom=0, top=1, near=1, far=2, ortho=True),
+         "left < right and bottom < top must be finite, got 0 and inf"),
+        (lambda: Camera.framing([(0, 0, 0)], fit="tight"),
+         "fit must be one of 'sphere', 'box', 'points', 'silhouette', got 'tight'"),
     ],
-)
+)  # fmt: skip
 def test_camera_more_impossible_is_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()

@@ -324,17 +324,11 @@ FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
         (lambda: Camera.from_nerfstudio({}), ValueError, "transforms must be the content or the path"),
         (lambda: Camera.from_nerfstudio({"frames": [FRAME]}, 1), IndexError, "i must be an index from 0 to 0, got 1"),
         (lambda: Camera.from_nerfstudio({"frames": [{}]}), ValueError, "frame 0 must have a transform_matrix"),
-        (
-            lambda: Camera.from_nerfstudio({"w": 4, "h": 4, "frames": [FRAME]}),
-            ValueError,
-            "transforms must have fl_x or camera_angle_x",
-        ),
+        (lambda: Camera.from_nerfstudio({"w": 4, "h": 4, "frames": [FRAME]}), ValueError,
+         "transforms must have fl_x or camera_angle_x"),
         (lambda: Camera.from_nerfstudio({"fl_x": 5, "frames": [FRAME]}), TypeError, r"size \(w and h of the file\)"),
-        (
-            lambda: Camera.from_nerfstudio({"camera_model": "ORTHOPHOTO", "frames": [FRAME]}),
-            ValueError,
-            "camera_model must be one of SIMPLE_PINHOLE, .*, got 'ORTHOPHOTO'",
-        ),
+        (lambda: Camera.from_nerfstudio({"camera_model": "ORTHOPHOTO", "frames": [FRAME]}), ValueError,
+         "camera_model must be one of SIMPLE_PINHOLE, .*, got 'ORTHOPHOTO'"),
         *(
             (
                 lambda key=key, value=value: Camera.from_nerfstudio(FILE | {key: value}),
@@ -343,17 +337,11 @@ FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
             )
             for key, value in [("latlong", True), ("equirectangular", True), ("orthographic", 1), ("ftheta_p0", 0.0)]
         ),
-        (
-            lambda: Camera.from_nerfstudio(FILE | {"camera_model": "OPENCV", "is_fisheye": True}),
-            ValueError,
-            "is_fisheye must be false where camera_model is OPENCV, got True",
-        ),
+        (lambda: Camera.from_nerfstudio(FILE | {"camera_model": "OPENCV", "is_fisheye": True}), ValueError,
+         "is_fisheye must be false where camera_model is OPENCV, got True"),
         (lambda: Camera.from_nerfstudio(FILE | {"w": 4.5}), TypeError, r"size \(w and h of the file\) .*4.5"),
-        (
-            lambda: Camera.from_nerfstudio({"fl_x": 5, "w": 4, "h": 4, "k4": 0.1, "frames": [FRAME]}),
-            ValueError,
-            "k4 of a camera_model OPENCV must be 0, got 0.1",
-        ),
+        (lambda: Camera.from_nerfstudio({"fl_x": 5, "w": 4, "h": 4, "k4": 0.1, "frames": [FRAME]}), ValueError,
+         "k4 of a camera_model OPENCV must be 0, got 0.1"),
         (
             lambda: Camera.from_nerfstudio(
                 {"fl_x": 5, "w": 4, "h": 4, "p1": 0.1, "camera_model": "OPENCV_FISHEYE", "frames": [FRAME]}
@@ -363,24 +351,15 @@ FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
         ),
         (lambda: Camera.from_opengl(np.eye(3)), ValueError, r"c2w must have shape \(4, 4\), got \(3, 3\)"),
         (lambda: Camera.from_opengl(np.eye(4), np.eye(3)), ValueError, "intrinsics need the size of their picture"),
-        (
-            lambda: Camera.from_opengl(np.eye(4), size=(4, 4)),
-            ValueError,
-            "size, distortion and fisheye need intrinsics",
-        ),
+        (lambda: Camera.from_opengl(np.eye(4), size=(4, 4)), ValueError,
+         "size, distortion and fisheye need intrinsics"),
         (lambda: Camera.from_pytorch3d(object(), size=4), TypeError, "cameras must have R, got object"),
-        (
-            lambda: Camera.from_pytorch3d(type("FoVOrthographicCameras", (), {})(), size=4),
-            ValueError,
-            "cameras must have perspective without a lens, got FoVOrthographicCameras",
-        ),
+        (lambda: Camera.from_pytorch3d(type("FoVOrthographicCameras", (), {})(), size=4), ValueError,
+         "cameras must have perspective without a lens, got FoVOrthographicCameras"),
         (lambda: Camera.from_pytorch3d(pytorch3d_cameras()), ValueError, "size must be given"),
         (lambda: Camera.from_pytorch3d(pytorch3d_cameras(), 2, size=4), IndexError, "i must be an index from 0 to 1"),
-        (
-            lambda: Camera.from_intrinsics(np.eye(3), np.eye(4), (4, 4), pixel_center=math.inf),
-            ValueError,
-            "pixel_center must be finite, got inf",
-        ),
+        (lambda: Camera.from_intrinsics(np.eye(3), np.eye(4), (4, 4), pixel_center=math.inf), ValueError,
+         "pixel_center must be finite, got inf"),
         (lambda: as_pose("pose", {"R": 1}), ValueError, r"pose must be \(4, 4\), .*, got a mapping with R"),
         (lambda: as_pose("pose", BOP | {"cam_t_m2c": [1]}), ValueError, "of pose must have 9 and 3 numbers, got 9 and"),
         (lambda: as_pose("pose", (np.eye(2), np.ones(3))), ValueError, r"got a pair of shapes \(2, 2\) and \(3,\)"),
@@ -388,7 +367,7 @@ FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
         (lambda: as_pose("pose", ([math.inf, 0, 0], [0, 0, 0])), ValueError, "pose must hold finite numbers"),
         (lambda: as_pose("pose", (np.zeros((3, 3)), [0, 0, 0])), ValueError, "pose must not be singular"),
     ],
-)
+)  # fmt: skip
 def test_what_is_no_camera_and_no_pose_is_refused(make, error, message):
     with pytest.raises(error, match=message):
         make()

@@ -95,19 +95,13 @@ def broken(scene, name, content):
         (lambda s: broken(s, "scene_gt.json", "["), "cannot read 'scene/scene_gt.json'"),
         (lambda s: broken(s, "scene_gt.json", '{"a": []}'), "it must hold an object with the numbers of images"),
         (lambda s: broken(s, "scene_camera.json", "{}"), "'scene/scene_camera.json' has no image 3, which scene_gt"),
-        (
-            lambda s: broken(s, "scene_gt.json", '{"3": [{"obj_id": 2}]}'),
-            "image 3 of 'scene' is not as BOP has it: the",
-        ),
-        (
-            lambda s: broken(s, "scene_camera.json", '{"3": {}, "10": {}}'),
-            "image 3 of 'scene' is not as BOP has it: 'ca",
-        ),
+        (lambda s: broken(s, "scene_gt.json", '{"3": [{"obj_id": 2}]}'),
+         "image 3 of 'scene' is not as BOP has it: the"),
+        (lambda s: broken(s, "scene_camera.json", '{"3": {}, "10": {}}'),
+         "image 3 of 'scene' is not as BOP has it: 'ca"),
         (lambda s: s.joinpath("models/obj_000005.ply").unlink(), "there is no file 'models/obj_000005.ply'"),
-        (
-            lambda s: s.joinpath("scene/depth/000003.png").unlink(),
-            "--size is needed: 'scene' has no picture of image 3",
-        ),
+        (lambda s: s.joinpath("scene/depth/000003.png").unlink(),
+         "--size is needed: 'scene' has no picture of image 3"),
         (
             lambda s: (
                 Image.new("L", (9, 9)).save(s / "scene/rgb" / "000003.png")
@@ -117,7 +111,7 @@ def broken(scene, name, content):
             "'scene/depth/000003.png' has 64x48 pixels, not 9x9",
         ),
     ],
-)
+)  # fmt: skip
 def test_a_folder_that_is_not_as_bop_has_it_is_told_in_one_line(scene, run, break_it, message):
     break_it(scene)
     status, lines = run("bop", "scene", "--models", "models", "-o", "info.json")

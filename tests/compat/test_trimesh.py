@@ -175,14 +175,11 @@ def light(kind, pose, **more):
 
 
 LIGHTS = {
-    "directional": (
-        light("DirectionalLight", away(-9)),
-        0.5,
-        0.5 + 0.508 * 0.5 * math.cos(math.atan(1 / 3) / 2) ** 51.2,
-    ),
+    "directional": (light("DirectionalLight", away(-9)), 0.5,
+     0.5 + 0.508 * 0.5 * math.cos(math.atan(1 / 3) / 2) ** 51.2),
     "point": (light("PointLight", away(1)), 0.5, 0.5 / math.sqrt(2)),
     "spot": (light("SpotLight", away(1), innerConeAngle=0.1, outerConeAngle=0.2), 0.5, 0.0),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(("own", "front", "aside"), LIGHTS.values(), ids=LIGHTS)

@@ -250,55 +250,35 @@ def test_grid_centers_go_with_the_rows():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (
-            lambda: tl.field((SQUARE, HALVES), [1, 2, 3], (4, 3)),
-            r"shape \(4,\) per vertex or \(2,\) per face, got \(3,\)",
-        ),
-        (
-            lambda: tl.field((SQUARE, HALVES), [1, 2], (4, 3), per="vertex"),
-            r"values must have shape \(4,\), got \(2,\)",
-        ),
-        (
-            lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), per="triangle"),
-            r"values must have shape \(2,\), got \(4,\)",
-        ),
+        (lambda: tl.field((SQUARE, HALVES), [1, 2, 3], (4, 3)),
+         r"shape \(4,\) per vertex or \(2,\) per face, got \(3,\)"),
+        (lambda: tl.field((SQUARE, HALVES), [1, 2], (4, 3), per="vertex"),
+         r"values must have shape \(4,\), got \(2,\)"),
+        (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), per="triangle"),
+         r"values must have shape \(2,\), got \(4,\)"),
         (lambda: tl.field((SQUARE, HALVES * 2), [1] * 4, (4, 3)), "values has 4 numbers, and there are as many faces"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), pixel_size=1), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, pixel_size=0), "pixel_size must be positive, got 0"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), y="left"), "y must be one of 'up', 'down', got 'left'"),
-        (
-            lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), extent=(0, 1, 2)),
-            r"extent must be \(x_min, x_max, y_min",
-        ),
-        (
-            lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), extent=(0, 0, 1, 2)),
-            "extent must be finite with x_min < x",
-        ),
-        (
-            lambda: tl.field((SQUARE, HALVES), [1] * 4, Grid((4, 3), (0, 1, 0, 1)), extent=(0, 1, 0, 1)),
-            "a Grid says extent, pixel_size and y itself",
-        ),
+        (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), extent=(0, 1, 2)),
+         r"extent must be \(x_min, x_max, y_min"),
+        (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), extent=(0, 0, 1, 2)),
+         "extent must be finite with x_min < x"),
+        (lambda: tl.field((SQUARE, HALVES), [1] * 4, Grid((4, 3), (0, 1, 0, 1)), extent=(0, 1, 0, 1)),
+         "a Grid says extent, pixel_size and y itself"),
         (lambda: tl.field((SQUARE, np.empty((0, 3), int)), [1] * 4, (4, 3)), "a mesh without triangles has no extent"),
-        (
-            lambda: tl.field(([1, 2], HALVES), [1] * 4, (4, 3)),
-            r"points must have shape \(V, 2\) or \(V, 3\), got \(2,\)",
-        ),
-        (
-            lambda: tl.field(([*SQUARE[:3], [0, np.nan]], HALVES), [1] * 4, (4, 3), extent=(0, 1, 0, 1)),
-            "must be finite",
-        ),
+        (lambda: tl.field(([1, 2], HALVES), [1] * 4, (4, 3)),
+         r"points must have shape \(V, 2\) or \(V, 3\), got \(2,\)"),
+        (lambda: tl.field(([*SQUARE[:3], [0, np.nan]], HALVES), [1] * 4, (4, 3), extent=(0, 1, 0, 1)),
+         "must be finite"),
         (lambda: tl.height_map((SQUARE, HALVES), 1), r"a height map needs points of shape \(V, 3\), got \(4, 2\)"),
-        (
-            lambda: tl.height_map((SQUARE, HALVES), 1, surface="top"),
-            "surface must be one of 'upper', 'lower', got 'top'",
-        ),
-        (
-            lambda: tl.height_map(([[0, 0, 0], [1, 0, np.nan], [0, 1, 0]], [[0, 1, 2]]), 1),
-            "vertices must be finite where a triangle uses them",
-        ),
+        (lambda: tl.height_map((SQUARE, HALVES), 1, surface="top"),
+         "surface must be one of 'upper', 'lower', got 'top'"),
+        (lambda: tl.height_map(([[0, 0, 0], [1, 0, np.nan], [0, 1, 0]], [[0, 1, 2]]), 1),
+         "vertices must be finite where a triangle uses them"),
     ],
-)
+)  # fmt: skip
 def test_field_impossible_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()

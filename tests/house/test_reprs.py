@@ -18,19 +18,15 @@ SCENE = tl.Scene([CUBE, (CUBE, np.diag([2, 2, 2, 1]), "<large>")])
         (tl.Camera.look_at((0, 0, 5)), "Camera(eye=(0, 0, 5), forward=(0, 0, -1), fov_y_deg=40)"),
         (tl.Camera.look_at((0, 0, 5), ortho_height=3), "Camera(eye=(0, 0, 5), forward=(0, 0, -1), ortho_height=3)"),
         (tl.Job(CUBE, None, (4, 3), {"cull": "back"}), "Job(Mesh, size=(4, 3), options=cull)"),
-        (
-            tl.Job("a.obj", None, (4, 3), {}, "a.png", ("depth",)),
-            "Job(a.obj, size=(4, 3), layers=('depth',), destination='a.png')",
-        ),
+        (tl.Job("a.obj", None, (4, 3), {}, "a.png", ("depth",)),
+         "Job(a.obj, size=(4, 3), layers=('depth',), destination='a.png')"),
         (tl.Material("red", specular=0.5), "Material(color=(255, 0, 0), specular=0.5)"),
         (tl.Texture(np.zeros((2, 3), np.uint8)), "Texture(3x2, filter='trilinear', wrap='repeat')"),
-        (
-            tl.Texture(np.zeros((2, 3), np.uint8), "nearest", ("clamp", "mirror")),
-            "Texture(3x2, filter='nearest', wrap='clamp/mirror')",
-        ),
+        (tl.Texture(np.zeros((2, 3), np.uint8), "nearest", ("clamp", "mirror")),
+         "Texture(3x2, filter='nearest', wrap='clamp/mirror')"),
         (tl.rasterize_mesh(CUBE, None, (4, 3)), "Fragments(4x3, 12 triangles)"),
     ],
-)
+)  # fmt: skip
 def test_repr_is_one_line(value, line):
     assert repr(value) == line
 

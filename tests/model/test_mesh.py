@@ -59,13 +59,10 @@ def test_mesh_unused_vertex_may_be_nan():
         (([[0, 0, 0], [0, np.inf, 0], [1, 1, 1]], [[2, 1, 0]]), ValueError, r"vertices\[1\] = \[0.0, inf, 0.0\] must"),
         ((TRIANGLE, [[0, 1, 2]], [[0, 0, 1]]), ValueError, r"normals must have shape \(3, 3\), got \(1, 3\)"),
         ((TRIANGLE, [[0, 1, 2]], None, [[0, 0, 0]]), TypeError, "colors must be uint8, got int64"),
-        (
-            (TRIANGLE, [[0, 1, 2]], None, np.zeros((2, 3), np.uint8)),
-            ValueError,
-            r"colors must have shape \(3, 3\) or \(3, 4\), got \(2, 3\)",
-        ),
+        ((TRIANGLE, [[0, 1, 2]], None, np.zeros((2, 3), np.uint8)), ValueError,
+         r"colors must have shape \(3, 3\) or \(3, 4\), got \(2, 3\)"),
     ],
-)
+)  # fmt: skip
 def test_mesh_of_bad_arrays_is_refused(arguments, error, message):
     with pytest.raises(error, match=message):
         Mesh(*arguments)

@@ -244,16 +244,10 @@ def test_overlap_snaps_to_as_fine_a_grid_as_there_is():
         ({"values": "labels"}, ValueError, "values must be 'index', a number or an array, got 'labels'"),
         ({"values": ["a"]}, TypeError, "values must be real numbers, got dtype <U1"),
         ({"values": [1], "background": [1, 2]}, ValueError, "background must be one number or have shape (), got (2,)"),
-        (
-            {"values": np.array([1], np.uint8), "background": -1},
-            ValueError,
-            "background must fit uint8, the dtype of values",
-        ),
-        (
-            {"values": "index", "sampling": "area"},
-            ValueError,
-            "mixes colours, which must be uint8 or floats, got numbers",
-        ),
+        ({"values": np.array([1], np.uint8), "background": -1}, ValueError,
+         "background must fit uint8, the dtype of values"),
+        ({"values": "index", "sampling": "area"}, ValueError,
+         "mixes colours, which must be uint8 or floats, got numbers"),
         ({"values": [1], "sampling": "msaa4"}, ValueError, "mixes colours, which must be uint8 or floats, got int64"),
         ({"background": 3}, ValueError, "background needs values"),
         ({"threads": 0}, ValueError, "threads must be at least 1, got 0"),
@@ -262,7 +256,7 @@ def test_overlap_snaps_to_as_fine_a_grid_as_there_is():
         ({"out": np.empty((5, 8))}, ValueError, "out must have shape (5, 8) and dtype bool"),
         ({"out": [1]}, TypeError, "out must be a NumPy array, got list"),
     ],
-)
+)  # fmt: skip
 def test_bad_options_are_named(options, error, message):
     with pytest.raises(error, match=re.escape(message)):
         tl.polygons(SQUARE, SIZE, **options)

@@ -232,15 +232,11 @@ def test_error_leaves_out_as_it_was():
         ([["r"], ["g"]], {}, TypeError, "colors must be uint8 or float32, got dtype"),
         (np.zeros((2, 3)), {"per": "face"}, ValueError, "per must be one of 'auto', 'triangle', 'vertex', got 'face'"),
         (np.zeros((2, 3), int), {"background": 300}, ValueError, "background must be whole numbers in 0..255"),
-        (
-            np.zeros((2, 3)),
-            {"background": [1, 2]},
-            ValueError,
-            "background must be one number or have shape (3,), got (2,)",
-        ),
+        (np.zeros((2, 3)), {"background": [1, 2]}, ValueError,
+         "background must be one number or have shape (3,), got (2,)"),
         (np.zeros((2, 3)), {"background": "red"}, TypeError, "background must be real numbers"),
     ],
-)
+)  # fmt: skip
 def test_bad_colors_raise(colors, options, kind, message):
     with raises(kind, message):
         tl.fill(SQUARE, HALVES, colors, SIZE, **options)

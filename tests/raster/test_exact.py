@@ -337,14 +337,11 @@ TRIANGLE = [[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 4)
     [
         (tl.coverage, {"sampling": "area"}, r"subpixel_bits must be in 0\.\.16 for sampling 'area', got 'exact'"),
         (tl.coverage, {"method": "float_barycentric"}, r"0\.\.16 for method 'float_barycentric.*got 'exact'"),
-        (
-            tl.coverage,
-            {"origin": (2**48, 0)},
-            "origin and size must lie within 281474976710656 pixels of 0 for 'exact'",
-        ),
+        (tl.coverage, {"origin": (2**48, 0)},
+         "origin and size must lie within 281474976710656 pixels of 0 for 'exact'"),
         (tl.coverage, {"subpixel_bits": "exacter"}, "subpixel_bits must be an integer, got 'exacter'"),
     ],
-)
+)  # fmt: skip
 def test_what_is_not_there_says_so(verb, options, message):
     with pytest.raises((ValueError, TypeError), match=message):
         verb(*TRIANGLE, **EXACT | options)

@@ -149,25 +149,16 @@ def test_view_has_run_lengths_of_every_instance_of_its_scene():
     ("ask", "error", "message"),
     [
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=-1), ValueError, "beyond must be a number of pictures"),
-        (
-            lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=1e30),
-            ValueError,
-            "beyond must reach at most 1073741824",
-        ),
+        (lambda: tl.object_masks(strewn(), CAMERA, SIZE, beyond=1e30), ValueError,
+         "beyond must reach at most 1073741824"),
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE).rle("all"), ValueError, "which must be"),
         (lambda: tl.object_masks(strewn(), CAMERA, SIZE).full(12), IndexError, "there are 12 objects, got 12"),
-        (
-            lambda: tl.object_masks(strewn(), CAMERA, SIZE).scene_gt_info(np.ones((2, 2))),
-            ValueError,
-            r"depth must have shape \(48, 64\), got \(2, 2\)",
-        ),
-        (
-            lambda: tl.object_masks(strewn(), CAMERA, SIZE).annotations(0, [1]),
-            ValueError,
-            "category_ids must be 12 integers, one of each object, got shape",
-        ),
+        (lambda: tl.object_masks(strewn(), CAMERA, SIZE).scene_gt_info(np.ones((2, 2))), ValueError,
+         r"depth must have shape \(48, 64\), got \(2, 2\)"),
+        (lambda: tl.object_masks(strewn(), CAMERA, SIZE).annotations(0, [1]), ValueError,
+         "category_ids must be 12 integers, one of each object, got shape"),
     ],
-)
+)  # fmt: skip
 def test_wrong_questions_are_refused(ask, error, message):
     with pytest.raises(error, match=message):
         ask()

@@ -147,13 +147,10 @@ def test_environment_goes_to_another_process():
         (lambda: tl.Environment(image=np.ones((0, 4, 3))), ValueError, r"image must have shape \(H, W, 3\) and pixels"),
         (lambda: tl.Environment(image=-np.ones((4, 4, 3))), ValueError, "image must hold finite light"),
         (lambda: tl.Environment(image=np.ones((4, 4, 3), int)), TypeError, "image must be uint8 or float, got int64"),
-        (
-            lambda: tl.render(tl.Mesh(*tl.scenes.shape("cube")), environment=(1, 2, 3)),
-            TypeError,
-            "environment must be an Environment, got tuple",
-        ),
+        (lambda: tl.render(tl.Mesh(*tl.scenes.shape("cube")), environment=(1, 2, 3)), TypeError,
+         "environment must be an Environment, got tuple"),
     ],
-)
+)  # fmt: skip
 def test_wrong_environments_are_named(make, error, message):
     with pytest.raises(error, match=message):
         make()

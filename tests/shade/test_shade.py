@@ -321,17 +321,11 @@ def test_shade_several_samples_of_one_triangle_are_as_one():
     [
         (lambda: tl.Light((0, 0, 0)), ValueError, r"at must be a direction, got \(0.0, 0.0, 0.0\)"),
         (lambda: tl.Light((0, 1)), ValueError, r"at must be three finite numbers, got \(0, 1\)"),
-        (
-            lambda: tl.Light((0, 1, 0), kind="area"),
-            ValueError,
-            "kind must be one of 'directional', 'point', 'spot', got",
-        ),
+        (lambda: tl.Light((0, 1, 0), kind="area"), ValueError,
+         "kind must be one of 'directional', 'point', 'spot', got"),
         (lambda: tl.Light((0, 1, 0), "spot"), ValueError, "direction must be given for a spot, and for no other kind"),
-        (
-            lambda: tl.Light((0, 1, 0), direction=(0, 1, 0)),
-            ValueError,
-            "direction must be given for a spot, and for no",
-        ),
+        (lambda: tl.Light((0, 1, 0), direction=(0, 1, 0)), ValueError,
+         "direction must be given for a spot, and for no"),
         (lambda: tl.Light((0, 1, 0), "spot", direction=(0, 0, 0)), ValueError, "direction must have a length, got"),
         (lambda: tl.Light((0, 1, 0), inner_deg=45), ValueError, "0 <= inner_deg < outer_deg <= 90 must hold, got 45"),
         (lambda: tl.Light((0, 1, 0), intensity=-1), ValueError, "intensity must be finite and not negative, got -1"),
@@ -346,17 +340,14 @@ def test_shade_several_samples_of_one_triangle_are_as_one():
         (lambda: replace(KNOT, uv=[[0, 1]]), ValueError, r"uv must have shape \(\d+, 2\), got \(1, 2\)"),
         (lambda: replace(KNOT, materials=[1]), TypeError, "materials must be of Material, got int"),
         (lambda: replace(KNOT, material_of_triangle=[0]), ValueError, "material_of_triangle must have shape"),
-        (
-            lambda: replace(KNOT, material_of_triangle=np.ones(len(KNOT.triangles), int), materials=[tl.Material()]),
-            IndexError,
-            r"material_of_triangle\[0\] = 1 must name one of 1 materials",
-        ),
+        (lambda: replace(KNOT, material_of_triangle=np.ones(len(KNOT.triangles), int), materials=[tl.Material()]),
+         IndexError, r"material_of_triangle\[0\] = 1 must name one of 1 materials"),
         (lambda: tl.render(KNOT, shading="matcap"), ValueError, "matcap must be a Texture for shading 'matcap'"),
         (lambda: tl.render(KNOT, lights=[(0, 1, 0)]), TypeError, "lights must be of Light, got tuple"),
         (lambda: tl.render(KNOT, fog=3), TypeError, "fog must be a Fog, got int"),
         (lambda: tl.render(KNOT, ambient=-1), ValueError, "ambient must be finite and not negative, got -1"),
     ],
-)
+)  # fmt: skip
 def test_wrong_values_are_named(make, error, message):
     with pytest.raises(error, match=message):
         make()

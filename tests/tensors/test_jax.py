@@ -152,42 +152,24 @@ def test_attributes_without_derivatives_have_no_columns():
         (lambda pos, tri, c: dr.rasterize(pos.astype(int), tri, SIZE), TypeError, "pos must be float32 or float64"),
         (lambda pos, tri, c: dr.interpolate(c, pos, tri), ValueError, "rast must have shape (B, H, W, 4), got"),
         (lambda pos, tri, c: dr.texture(c, pos), ValueError, "uv must have shape (B, H, W, 2), got"),
-        (
-            lambda pos, tri, c: dr.texture(c, pos, "cubic"),
-            ValueError,
-            "filter_mode must be 'nearest', 'linear', 'linear-m",
-        ),
-        (
-            lambda pos, tri, c: dr.texture(c, pos, boundary_mode="a"),
-            ValueError,
-            "boundary_mode must be 'wrap', 'clamp'",
-        ),
-        (
-            lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), "linear-mipmap-linear"),
-            ValueError,
-            "filter_mode='linear-mipmap-linear' needs uv_da or mip_level_bias",
-        ),
-        (
-            lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), uv_da=jnp.zeros((1, 2, 2, 2))),
-            ValueError,
-            "uv_da must have shape (1, 2, 2, 4), got",
-        ),
+        (lambda pos, tri, c: dr.texture(c, pos, "cubic"), ValueError,
+         "filter_mode must be 'nearest', 'linear', 'linear-m"),
+        (lambda pos, tri, c: dr.texture(c, pos, boundary_mode="a"), ValueError,
+         "boundary_mode must be 'wrap', 'clamp'"),
+        (lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), "linear-mipmap-linear"), ValueError,
+         "filter_mode='linear-mipmap-linear' needs uv_da or mip_level_bias"),
+        (lambda pos, tri, c: dr.texture(TEX, jnp.zeros((1, 2, 2, 2)), uv_da=jnp.zeros((1, 2, 2, 2))), ValueError,
+         "uv_da must have shape (1, 2, 2, 4), got"),
         (lambda pos, tri, c: dr.halvings(TEX, -1), ValueError, "max_mip_level must be at least 0, got -1"),
-        (
-            lambda pos, tri, c: dr.halvings(TEX[:, :6], None),
-            ValueError,
-            "halve down to level 2, got (6, 8); max_mip_le",
-        ),
+        (lambda pos, tri, c: dr.halvings(TEX[:, :6], None), ValueError,
+         "halve down to level 2, got (6, 8); max_mip_le"),
         (lambda pos, tri, c: dr.render(pos[0], tri, c, SIZE), ValueError, "pos must have shape (B, V, 4), got"),
-        (
-            lambda pos, tri, c: dr.render(pos, tri, c[None, None], SIZE),
-            ValueError,
-            "attr must have shape (V, K), (1, V, K) or (1, V, K), got",
-        ),
+        (lambda pos, tri, c: dr.render(pos, tri, c[None, None], SIZE), ValueError,
+         "attr must have shape (V, K), (1, V, K) or (1, V, K), got"),
         (lambda pos, tri, c: dr.render(pos, tri, c, SIZE, edges="a"), ValueError, "edges must be 'silhouette', 'area'"),
         (lambda pos, tri, c: dr.antialias(c, pos, pos, tri), ValueError, "color must have shape (B, H, W, C), got"),
     ],
-)
+)  # fmt: skip
 def test_wrong_arguments_raise(call, kind, message):
     with pytest.raises(kind, match=re.escape(message)):
         call(*sphere(1))
