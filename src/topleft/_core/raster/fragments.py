@@ -106,7 +106,179 @@ def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
     return planes if planes.dtype == kind and planes.flags.carray else np.require(planes, kind, ["C", "A"])
 
 
-class Fragments:
+class Attributes:
+    """Attributes at the visible pixels of a picture (H, W), or of a batch of pictures (B, H, W)."""
+
+    #: Ids of triangles, -1 where there is none.
+    id: NDArray[Any]
+
+    def _at_sample(self, i: object) -> Any:
+        """Return ids, depth and attributes at one sample of each pixel."""
+        raise NotImplementedError
+
+    def _checked(self, values: Any) -> Any:
+        """Check an attribute and return it as float32, or one array for each mesh."""
+        raise NotImplementedError
+
+    def _interpolated(self, array: Any, background: float) -> NDArray[np.float32]:
+        """The attribute of checked values."""
+        raise NotImplementedError
+
+    def _derivatives(self, array: Any) -> NDArray[np.float32]:
+        """The derivatives of checked values along x and y, (..., K, 2) or (..., 2) float32."""
+        raise NotImplementedError
+
+    @property
+    def triangle(self) -> NDArray[np.int32]:
+        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
+        return self.id
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """Where there is a triangle, bool (H, W)."""
+        return self.id >= 0
+
+    def _ids(self) -> NDArray[np.int32]:
+        return np.require(self.triangle, np.int32, ["C", "A"])
+
+    @overload
+    def sample(self, texture: int) -> Any: ...
+    @overload
+    def sample(
+        self,
+        texture: object,
+        uv: Any,
+        *,
+        filter: FilterOption = "trilinear",
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> NDArray[np.float32]: ...
+    def sample(
+        self,
+        texture: Any,
+        uv: Any = None,
+        *,
+        filter: FilterOption = "trilinear",  # noqa: A002
+        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
+        encoding: EncodingOption | None = None,
+        background: float = 0.0,
+    ) -> Any:
+        """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
+
+        Parameters
+        ----------
+        texture : Texture, or array_like of real numbers, shape (H, W) or (H, W, C); or int
+            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` has
+            its own filter, wrap and encoding. A number without `uv`: the fragments of that sample of several.
+        uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene and of a batch as in `interpolate`
+            Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
+        filter : {"trilinear", "bilinear", "nearest", "pixelated"}
+            "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
+            which is that of the analytic derivatives of `uv`.
+        wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
+            The texture beyond 0 and 1.
+        encoding : {"linear", "srgb"}, optional
+            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded
+            to linear light.
+        background : float
+            Value where there is no triangle.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, C), or (H, W) for a texture of shape (H, W); of a batch (B, H, W, C)
+            Of a `Texture` linear light and opacity, (H, W, 4), 0 to 1.
+
+        Raises
+        ------
+        ValueError
+            If a shape does not fit or an option is unknown.
+        TypeError
+            If the texture holds no real numbers.
+
+        References
+        ----------
+        L. Williams, Pyramidal Parametrics, 1983.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> frags.sample([[0.0, 10.0]], [[0, 0], [1, 0], [0, 1]], filter="nearest")
+        array([[ 0.,  0., 10.,  0.],
+               [ 0.,  0.,  0.,  0.]], dtype=float32)
+        """
+        if uv is None:
+            return self._at_sample(texture)
+        levels = as_levels(texture, filter, wrap, encoding)
+        ground = as_number("background", background)
+        found, slopes = self._places(levels, uv)
+        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
+        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
+        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
+
+    def _places(self, levels: ValueLevels, uv: Any) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+        """Return where pixels lie in a texture, and how that changes from one to the next if it has halvings."""
+        if len(levels.rows) > 1:
+            found, slopes = self.interpolate(uv, derivatives=True)
+        else:
+            found, slopes = self.interpolate(uv), None
+        columns = found.shape[self.id.ndim :]
+        if columns != (2,):
+            raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {columns or 'one'}")
+        return found, slopes
+
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
+    ) -> NDArray[np.float32]: ...
+    @overload
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+    def interpolate(
+        self, values: Any, *, background: float = 0.0, derivatives: bool = False
+    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return an attribute of the vertices at each visible pixel, and its derivatives if asked for.
+
+        Parameters
+        ----------
+        values : array_like of real numbers, shape (V, K) or (V,) per vertex, or (T, 3, K) per corner of each triangle
+            Used as float32. Of points (N, K) or (N,); of a scene one array for each instance; of a batch those of all
+            poses, or (B, V, K) of each.
+        background : float
+            Value where there is no triangle.
+        derivatives : bool
+            Whether to return the derivatives, too.
+
+        Returns
+        -------
+        ndarray of float32, shape (H, W, K), or (H, W) for values of shape (V,); of a batch (B, H, W, K) or (B, H, W)
+            Perspective-correct for clip-space vertices, screen-linear for pixels. With `derivatives` a pair of this and
+            (H, W, K, 2), or (H, W, 2): the derivatives along x (to the right) and y (down), per pixel, 0 where there
+            is no triangle. They are those of the triangle before the snap, in float64, not differences of pixels.
+
+        Raises
+        ------
+        ValueError
+            If the number of rows is not that of the vertices or triangles, or for derivatives of points or of layers.
+        TypeError
+            If the values are no real numbers.
+
+        Examples
+        --------
+        >>> import topleft as tl
+        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
+        >>> frags.interpolate([0.0, 4.0, 0.0])
+        array([[0.5, 1.5, 2.5, 0. ],
+               [0.5, 1.5, 0. , 0. ]], dtype=float32)
+        """
+        checked = self._checked(values)
+        found = self._interpolated(checked, as_number("background", background))
+        return (found, self._derivatives(checked)) if derivatives else found
+
+
+class Fragments(Attributes):
     """The visibility buffer that `rasterize` returns.
 
     Attributes, and all samples but the first, are computed on first access, from the `triangles` that were passed
@@ -213,11 +385,6 @@ class Fragments:
         return f"Fragments({width}x{height}, {self._n_triangles} triangles)"
 
     @property
-    def triangle(self) -> NDArray[np.int32]:
-        """Index of the triangle that shows in the pixel, int32 (H, W), -1 where there is none."""
-        return self.id
-
-    @property
     def instance(self) -> NDArray[np.int32]:
         """Index of the mesh that shows in the pixel, int32 (H, W): 0, -1 where there is none."""
         return np.minimum(self.id, 0)
@@ -244,11 +411,6 @@ class Fragments:
         """Depth by sample, float32 (H, W, S)."""
         return np.moveaxis(self.drawn_planes[1], 0, -1)
 
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where there is a triangle, bool (H, W)."""
-        return self.id >= 0
-
     @classmethod
     def of_samples(
         cls,
@@ -269,92 +431,6 @@ class Fragments:
         frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
         frags._split = split
         return frags
-
-    @overload
-    def sample(self, texture: int) -> Fragments: ...
-    @overload
-    def sample(
-        self,
-        texture: object,
-        uv: Any,
-        *,
-        filter: FilterOption = "trilinear",
-        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
-        encoding: EncodingOption | None = None,
-        background: float = 0.0,
-    ) -> NDArray[np.float32]: ...
-    def sample(
-        self,
-        texture: Any,
-        uv: Any = None,
-        *,
-        filter: FilterOption = "trilinear",  # noqa: A002
-        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
-        encoding: EncodingOption | None = None,
-        background: float = 0.0,
-    ) -> Any:
-        """Return a texture at each visible pixel; or, of a number alone, the fragments at that sample of each pixel.
-
-        Parameters
-        ----------
-        texture : Texture, or array_like of real numbers, shape (H, W) or (H, W, C); or int
-            Any number of channels. Row 0 is the top, where v = 1; bytes are taken as 0 to 1. A `Texture` has
-            its own filter, wrap and encoding. A number without `uv`: the fragments of that sample of several.
-        uv : array_like, shape (V, 2) per vertex or (T, 3, 2) per corner; of a scene one for each instance
-            Where the vertices lie in the texture: u from left to right, v from the bottom up, 0 to 1.
-        filter : {"trilinear", "bilinear", "nearest", "pixelated"}
-            "trilinear": between texels, and between the two halvings next to the longer side of the pixel's footprint,
-            which is that of the analytic derivatives of `uv`.
-        wrap : {"repeat", "clamp", "mirror"}, or a pair of them for u and v
-            The texture beyond 0 and 1.
-        encoding : {"linear", "srgb"}, optional
-            "linear", unless given: values are taken as they are. "srgb": the first three channels are decoded
-            to linear light.
-        background : float
-            Value where there is no triangle.
-
-        Returns
-        -------
-        ndarray of float32, shape (H, W, C), or (H, W) for a texture of shape (H, W)
-            Of a `Texture` linear light and opacity, (H, W, 4), 0 to 1.
-
-        Raises
-        ------
-        ValueError
-            If a shape does not fit or an option is unknown.
-        TypeError
-            If the texture holds no real numbers.
-
-        References
-        ----------
-        L. Williams, Pyramidal Parametrics, 1983.
-
-        Examples
-        --------
-        >>> import topleft as tl
-        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
-        >>> frags.sample([[0.0, 10.0]], [[0, 0], [1, 0], [0, 1]], filter="nearest")
-        array([[ 0.,  0., 10.,  0.],
-               [ 0.,  0.,  0.,  0.]], dtype=float32)
-        """
-        if uv is None:
-            return self._at_sample(texture)
-        levels = as_levels(texture, filter, wrap, encoding)
-        ground = as_number("background", background)
-        found, slopes = self._places(levels, uv)
-        of_pixels = None if slopes is None else slopes.reshape(-1, 2, 2)
-        out = levels.look_up(self._ids().reshape(-1), found.reshape(-1, 2), of_pixels, ground)
-        return out.reshape(self.id.shape if levels.is_flat else (*self.id.shape, levels.n_channels))
-
-    def _places(self, levels: ValueLevels, uv: Any) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
-        """Return where pixels lie in a texture, and how that changes from one to the next if it has halvings."""
-        if len(levels.rows) > 1:
-            found, slopes = self.interpolate(uv, derivatives=True)
-        else:
-            found, slopes = self.interpolate(uv), None
-        if found.shape[2:] != (2,):
-            raise ValueError(f"uv must have two columns, (V, 2) or (T, 3, 2), got {found.shape[2:] or 'one'}")
-        return found, slopes
 
     def _at_sample(self, i: object) -> Fragments:
         """Return ids, depth and attributes at one sample of each pixel."""
@@ -606,54 +682,6 @@ class Fragments:
         self._snapped.with_inverse_w(self.id.size, empty).barycentric(self._ids(), out)
         return out
 
-    @overload
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: Literal[False] = False
-    ) -> NDArray[np.float32]: ...
-    @overload
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: Literal[True]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
-    def interpolate(
-        self, values: Any, *, background: float = 0.0, derivatives: bool = False
-    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return an attribute of the vertices at each visible pixel, and its derivatives if asked for.
-
-        Parameters
-        ----------
-        values : array_like of real numbers, shape (V, K) or (V,) per vertex, or (T, 3, K) per corner of each triangle
-            Used as float32.
-        background : float
-            Value where there is no triangle.
-        derivatives : bool
-            Whether to return the derivatives, too.
-
-        Returns
-        -------
-        ndarray of float32, shape (H, W, K), or (H, W) for values of shape (V,)
-            Perspective-correct for clip-space vertices, screen-linear for pixels. With `derivatives` a pair of this and
-            (H, W, K, 2), or (H, W, 2): the derivatives along x (to the right) and y (down), per pixel, 0 where there
-            is no triangle. They are those of the triangle before the snap, in float64, not differences of pixels.
-
-        Raises
-        ------
-        ValueError
-            If the number of rows is not that of the vertices or triangles.
-        TypeError
-            If the values are no real numbers.
-
-        Examples
-        --------
-        >>> import topleft as tl
-        >>> frags = tl.rasterize([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], (4, 2))
-        >>> frags.interpolate([0.0, 4.0, 0.0])
-        array([[0.5, 1.5, 2.5, 0. ],
-               [0.5, 1.5, 0. , 0. ]], dtype=float32)
-        """
-        checked = self._checked(values)
-        found = self._interpolated(checked, as_number("background", background))
-        return (found, self._derivatives(checked)) if derivatives else found
-
     def _checked(self, values: Any) -> Any:
         """Check an attribute and return it as float32."""
         return as_values(values, self._n_vertices, self._n_triangles)
@@ -702,9 +730,6 @@ class Fragments:
         if isinstance(self._snapped_or_maker, engine.SnappedMesh):
             return self._snapped_or_maker
         return self._snapped_or_maker(self.id, *triangles)
-
-    def _ids(self) -> NDArray[np.int32]:
-        return np.require(self.triangle, np.int32, ["C", "A"])
 
 
 def as_sample(i: object, n: int) -> int:

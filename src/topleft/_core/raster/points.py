@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from topleft._core import engine
-from topleft._core.base.arrays import as_array, as_count, as_number, as_point_size, as_real, as_vertices
+from topleft._core.base.arrays import as_array, as_count, as_point_size, as_real, as_vertices
 from topleft._core.base.memory import FRESH, Memory, check_fits
 from topleft._core.base.options import Sink, parse
 from topleft._core.base.threads import count_threads, run_parts
@@ -87,37 +87,19 @@ class PointFragments(Fragments):
         """Raise a `ValueError`: a point has no corners."""
         raise ValueError("points have no barycentric weights")
 
-    def interpolate(self, values: Any, *, background: float = 0.0, derivatives: bool = False) -> Any:
-        """Return an attribute of the points at each visible pixel.
+    def _checked(self, values: Any) -> NDArray[np.float32]:
+        array, n = as_real("values", values).astype(np.float32), self._n_vertices
+        if array.ndim not in (1, 2) or len(array) != n:
+            raise ValueError(f"values must have shape ({n}, K) or ({n},), got {array.shape}")
+        return array
 
-        Parameters
-        ----------
-        values : array_like of real numbers, shape (N, K) or (N,)
-            Used as float32.
-        background : float
-            Value where there is no point.
-        derivatives : bool
-            Points have none: True is refused.
-
-        Returns
-        -------
-        ndarray of float32, shape (H, W, K), or (H, W) for values of shape (N,)
-
-        Raises
-        ------
-        ValueError
-            If the number of rows is not that of the points, or with `derivatives`.
-        """
-        if derivatives:
-            raise ValueError("derivatives are those of triangles: a point has one value")
-        array = as_real("values", values).astype(np.float32)
-        if array.ndim not in (1, 2) or len(array) != self._n_vertices:
-            raise ValueError(
-                f"values must have shape ({self._n_vertices}, K) or ({self._n_vertices},), got {array.shape}"
-            )
-        out = np.full((*self.id.shape, *array.shape[1:]), as_number("background", background), np.float32)
+    def _interpolated(self, array: NDArray[np.float32], background: float) -> NDArray[np.float32]:
+        out = np.full((*self.id.shape, *array.shape[1:]), background, np.float32)
         out[self.mask] = array[self.id[self.mask]]
         return out
+
+    def _derivatives(self, array: NDArray[np.float32]) -> NDArray[np.float32]:  # noqa: ARG002
+        raise ValueError("derivatives are those of triangles: a point has one value")
 
 
 def points(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal, Unpack, overload
+from typing import Any, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from topleft._core.base.arrays import as_array, as_checked_triangles, as_out, as_transform, as_triangles
 from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.threads import available_threads, run_parts
-from topleft._core.raster.fragments import Fragments
+from topleft._core.raster.fragments import Attributes, Fragments
 from topleft._core.raster.rasterize import draw_fragments, fragment_options
 from topleft._core.raster.view import Planned, View, ViewOptions
-from topleft.typing import DepthTestOption, EncodingOption, FilterOption, WrapOption
+from topleft.typing import DepthTestOption
 
 
-class FragmentsBatch(Sequence[Fragments]):
+class FragmentsBatch(Attributes, Sequence[Fragments]):
     """The visibility buffers of B poses that `rasterize_poses` returns, one behind the other.
 
     Attributes
@@ -45,7 +45,7 @@ class FragmentsBatch(Sequence[Fragments]):
     """
 
     def __init__(self, triangle: NDArray[np.int32], depth: NDArray[np.float32], frags: Sequence[Fragments]) -> None:
-        self.triangle, self.depth = triangle, depth
+        self.id, self.depth = triangle, depth
         self._frags = tuple(frags)
 
     def __repr__(self) -> str:
@@ -62,11 +62,6 @@ class FragmentsBatch(Sequence[Fragments]):
     def __getitem__(self, i: int | slice) -> Fragments | Sequence[Fragments]:
         """Return the visibility buffer of a pose; its arrays are views."""
         return self._frags[i]
-
-    @property
-    def mask(self) -> NDArray[np.bool_]:
-        """Where there is a triangle, bool (B, H, W)."""
-        return self.triangle >= 0
 
     def barycentric(self) -> NDArray[np.float32]:
         """Return the weights of the triangles' vertices, (B, H, W, 3) float32; see `Fragments.barycentric`."""
@@ -92,90 +87,29 @@ class FragmentsBatch(Sequence[Fragments]):
         found = [frags.samples_depth for frags in self]
         return np.stack(found) if found else self.depth[..., None]
 
-    @overload
-    def sample(self, texture: int) -> FragmentsBatch: ...
-    @overload
-    def sample(
-        self,
-        texture: object,
-        uv: Any,
-        *,
-        filter: FilterOption = "trilinear",
-        wrap: WrapOption | tuple[WrapOption, WrapOption] = "repeat",
-        encoding: EncodingOption | None = None,
-        background: float = 0.0,
-    ) -> NDArray[np.float32]: ...
-    def sample(self, texture: Any, uv: Any = None, **options: Any) -> Any:
-        """Return a texture at each visible pixel, (B, H, W, C) float32; or, of a number alone, that sample of pixels.
+    def _at_sample(self, i: object) -> FragmentsBatch:
+        height, width = self.id.shape[1:]
+        return FragmentsBatch.stacked([frags._at_sample(i) for frags in self], (width, height))
 
-        Parameters
-        ----------
-        texture, **options
-            As `Fragments.sample` takes them.
-        uv : array_like
-            Of all poses, (V, 2), say; or of each, (B, V, 2).
-
-        Raises
-        ------
-        ValueError, TypeError, IndexError
-            As `Fragments.sample`; also for neither one nor B arrays of uv.
-        """
-        if uv is None:
-            height, width = self.triangle.shape[1:]
-            return FragmentsBatch.stacked([frags.sample(texture) for frags in self], (width, height))
-        found = [frags.sample(texture, one, **options) for frags, one in zip(self, self._each(uv), strict=True)]
-        channels = np.shape(getattr(texture, "image", texture))[2:]
-        return self._stacked(found, channels)
-
-    @overload
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[False] = False
-    ) -> NDArray[np.float32]: ...
-    @overload
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: Literal[True]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
-    def interpolate(
-        self, values: ArrayLike, *, background: float = 0.0, derivatives: bool = False
-    ) -> NDArray[np.float32] | tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return an attribute of the vertices at each visible pixel, (B, H, W, K) or (B, H, W) float32.
-
-        Parameters
-        ----------
-        values : array_like of real numbers
-            Of all poses, as `Fragments.interpolate` takes them, (V, K), say; or of each, (B, V, K).
-        background : float
-            Value where there is no triangle.
-        derivatives : bool
-            Whether to return the derivatives, too, (B, H, W, K, 2) or (B, H, W, 2).
-
-        Raises
-        ------
-        ValueError
-            If there are neither one nor B arrays of values, or they do not fit.
-        """
-        own = self._each(values)
-        channels = () if np.ndim(own[0] if len(own) else as_array("values", values)) < 2 else own[0].shape[-1:]
-        pairs = zip(self, own, strict=True)
-        if not derivatives:
-            return self._stacked([frags.interpolate(one, background=background) for frags, one in pairs], channels)
-        both = [frags.interpolate(one, background=background, derivatives=True) for frags, one in pairs]
-        return (
-            self._stacked([found for found, _ in both], channels),
-            self._stacked([slopes for _, slopes in both], (*channels, 2)),
-        )
-
-    def _each(self, values: ArrayLike) -> Sequence[NDArray[Any]]:
-        """Return the values of each pose: a part of (B, ...), or the values of all poses."""
+    def _checked(self, values: Any) -> Sequence[NDArray[Any]]:
+        """Check the values of all poses, or of each (B, ...), and return those of each."""
         array = as_array("values", values)
         has_own = array.ndim == 4 or (array.ndim == 3 and array.shape[1] == (self[0]._n_vertices if self else 0))
         if has_own and len(array) != len(self):
             raise ValueError(f"values must be those of all, or {len(self)} of them, got {len(array)}")
-        return list(array) if has_own else [array] * len(self)
+        return list(array) if has_own and len(self) else [array] * max(1, len(self))  # of no pose for its channels
+
+    def _interpolated(self, array: Sequence[NDArray[Any]], background: float) -> NDArray[np.float32]:
+        pairs = zip(self, array, strict=False)
+        found = [frags._interpolated(frags._checked(values), background) for frags, values in pairs]
+        return self._stacked(found, array[0].shape[1:][-1:])
+
+    def _derivatives(self, array: Sequence[NDArray[Any]]) -> NDArray[np.float32]:
+        found = [frags._derivatives(frags._checked(values)) for frags, values in zip(self, array, strict=False)]
+        return self._stacked(found, (*array[0].shape[1:][-1:], 2))
 
     def _stacked(self, found: list[NDArray[np.float32]], channels: tuple[int, ...]) -> NDArray[np.float32]:
-        shape = *self.triangle.shape, *channels
-        return np.stack(found) if found else empty(shape, np.float32)
+        return np.stack(found) if found else empty((*self.id.shape, *channels), np.float32)
 
 
 class PlanOfPoses(Planned):

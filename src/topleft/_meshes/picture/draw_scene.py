@@ -113,8 +113,7 @@ def draw_joined(placed: Placed, sink: Sink, background: float) -> Fragments | No
     split = draw_split(own, sink, (height, width), background)
     if split is None:
         refuse_changed()
-    n_vertices, n_triangles = int(placed.scene.first_vertices[-1]), placed.scene.n_triangles
-    return placed.kind_of_fragments.of(Fragments.of_split(split, n_vertices, n_triangles), placed)
+    return placed.fragments(split.ids[None], split.depth[None], split)
 
 
 def draw_scene(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool = True) -> None:

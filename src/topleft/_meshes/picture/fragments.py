@@ -20,7 +20,7 @@ from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, Viewer, view_of
 from topleft._core.raster.peel import DepthLayers
-from topleft._core.raster.sampling import split_ranges
+from topleft._core.raster.sampling import SplitSamples, split_ranges
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
@@ -170,10 +170,11 @@ class SceneFragments(InstanceIds, Fragments):
     _one: Fragments | None = None
 
     def __init__(
-        self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]]
-    ) -> None:
-        """Take drawn planes (S, H, W), and where their samples lie."""
-        self._planes = ids, depth
+        self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]],
+        split: SplitSamples | None = None,
+    ) -> None:  # fmt: skip
+        """Take drawn planes (S, H, W), or the plane of the first sample and `split`; and where samples lie."""
+        self._planes, self._split = (ids, depth), split
         self.placed = placed
         self.positions = positions
         self.id, self._depth = placed.whole_ids(ids[0]), depth[0]
@@ -181,8 +182,8 @@ class SceneFragments(InstanceIds, Fragments):
     @classmethod
     def of(cls, drawn: Fragments, placed: Placed) -> Self:
         """Return the fragments of a scene from the fragments of all its triangles as one mesh."""
-        frags = cls(drawn.id[None], drawn.depth[None], placed, placed.positions)
-        frags._split, frags._planes = drawn._split, drawn._planes or frags._planes
+        planes = drawn._planes or (drawn.id[None], drawn.depth[None])
+        frags = cls(*planes, placed, placed.positions, drawn._split)
         frags._one = drawn if len(placed.scene.first_ids) == 2 else None
         return frags
 
