@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from topleft import Camera, Mesh, Points, Rasterizer, Scene, as_mesh, load, render, render_transparent
-from topleft._apps.batch.made import FromFile, record_of
+from topleft._apps.batch.made import Contents, FromFile
 from topleft._core.base.array_types import Array, MeshLike
 from topleft._core.base.arrays import as_number, as_scale, as_size, shown
 from topleft._core.base.cached import cached_property
@@ -229,6 +229,7 @@ class JobRunner:
 
     def __init__(self, n_meshes: int = 4) -> None:
         self._cache = LoadedMeshes(n_meshes)
+        self._contents = Contents()
         self._threads = threading.local()
 
     def draw(self, jobs: Sequence[tuple[int, Job]]) -> list[Outcome]:
@@ -267,7 +268,7 @@ class JobRunner:
         options = {name: value for name, value in job.options.items() if name != "threads"}
         layers, (first, *_), size = job.checked
         parts = first.suffix, layers, size, job.scale, job.depth_scale, options, job.camera, subject
-        return record_of(parts, _home_of(job), files)
+        return self._contents.record_of(parts, _home_of(job), files)
 
     def _draw_one(self, job: Job, heard: Heard) -> Array | dict[str, Array] | None:
         """Return the picture of a job, arrays by name if it asks for layers, or None when they are in their files."""
