@@ -158,6 +158,9 @@ TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const 
  * elsewhere.  Xors the ids with `flip` first. */
 TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out)
 
+/* Writes rows of a picture of `width` columns from `to` on, with non-temporal stores. */
+TL_KERNEL(void, lay_rows, const tl_laid_rows *rows, int32_t *to, int64_t width)
+
 /* Lists the pixels whose samples differ in their id, from entry `at` on; needs room for 16 entries more.  Returns the
  * end of the list. */
 TL_KERNEL(int64_t, split_pixels, const tl_seen_samples *seen, const tl_split *split, int64_t at)

@@ -299,6 +299,14 @@ typedef struct {
     int sample_bits;
 } tl_seen_samples;
 
+/* Rows of a picture that were drawn in the columns [col0, col0 + n_cols), `stride` numbers apart; elsewhere they are
+ * `blank`. */
+typedef struct {
+    const int32_t *drawn;
+    int64_t stride, col0, n_cols, n_rows;
+    int32_t blank;
+} tl_laid_rows;
+
 /* How the samples' colours are averaged: uint8 values are decoded to light and back in 65537 steps, except alpha, after
  * the first n_channels.  With straight alpha colours are weighted by it. */
 typedef struct {

@@ -4,6 +4,7 @@
 #include "pixels/composite.c"
 #include "pixels/instances.c"
 #include "pixels/paint.c"
+#include "pixels/lay.c"
 #include "pixels/planes.c"
 #include "pixels/png.c"
 #include "pixels/points.c"

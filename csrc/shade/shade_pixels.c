@@ -252,15 +252,13 @@ TL_INLINE vf in_eye_space(const shaded_lanes *p, int axis)
     return dot3(row, p->normal);
 }
 
-/* The light and the opacity of vector i of the span that begins at `column`; some pixel of it is visible.  `depth`
- * points to its first pixel; it is read only without perspective. */
-TL_INLINE void light_pixels(const shade_runs *s, int i, int64_t column, int64_t row, const float *depth, vf *rgba)
+/* The light and opacity of pixels after `start_lanes`; `laid` holds the texels of a texture, or `as` is NULL.  `depth`
+ * points to the first pixel; it is read only without perspective. */
+TL_INLINE void shade_pixels(shaded_lanes *p, laid_texture *laid, int64_t row, const float *depth, vf *rgba)
 {
-    shaded_lanes own, *const p = &own;
-    laid_texture laid = {.as = NULL};
+    const shade_runs *s = p->s;
     const tl_shading *shading = s->shading;
     const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
-    start_lanes(p, s, i, column);
     p->opacity = vf_set1(1.0f);
     if (s->needs_normal)
         set_normals(p);
@@ -285,9 +283,9 @@ TL_INLINE void light_pixels(const shade_runs *s, int i, int64_t column, int64_t 
         if (s->needs_point)
             set_points(p, row, depth);
         if (shading->material_of)
-            shade_materials(p, &laid, rgba);
+            shade_materials(p, laid, rgba);
         else
-            shade_material(p, shading->materials, &laid, rgba);
+            shade_material(p, shading->materials, laid, rgba);
     }
     if (shading->fog_scale != 0.0f)
         fade(p, depth, rgba);

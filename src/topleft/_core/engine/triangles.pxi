@@ -434,24 +434,48 @@ cdef class Bins:
         return ids
 
 
-def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], Bins bins, int64_t first_band, int64_t end_band):
-    """Clear and draw bands of several pictures, a mesh each: a band of all pictures before the next band."""
+def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t[:, ::1] room or None, Bins bins,
+               int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a mesh each: a band of all pictures before the next band.
+
+    `room`: a buffer for the ids and depth of a band, (2, rows * (W + 16)), that stays in the cache and is copied by
+    streaming stores; `bins` hold the columns of each band. None: bands are drawn in place.
+    """
     cdef SnappedMesh mesh
     cdef Target target
-    cdef tl_target rows
+    cdef tl_target rows, near
     cdef tl_window window
+    cdef tl_laid_rows laid
     cdef tl_slice slice = no_slice()
     cdef int64_t band, first_row
+    cdef float farthest
     cdef list pairs = list(zip(meshes, targets, strict=True))
     slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         bins.take(&slice, band)
         for mesh, target in pairs:
-            rows = target.rows(first_row)
+            rows = near = target.rows(first_row)
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
+            if room is None:
+                with nogil:
+                    K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
+                continue
+            laid.col0, laid.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
+            laid.n_rows, laid.stride = window.height, (laid.n_cols + 15) & ~<int64_t>15
+            window.x_px, window.width = window.x_px + laid.col0, laid.n_cols
+            near.pixels, near.stride_px = &room[0, 0], laid.stride
+            near.depth = <float *>&room[1, 0] if rows.depth != NULL else NULL
+            farthest = -INFINITY if rows.sink == TL_SINK_FARTHEST else INFINITY
             with nogil:
-                K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
+                if laid.n_cols:
+                    K.draw_mesh(&mesh.snapped, &window, &near, &slice)
+                laid.drawn, laid.blank = &room[0, 0], 0 if rows.sink == TL_SINK_COUNT else -1
+                K.lay_rows(&laid, <int32_t *>rows.pixels, target.width)
+                if rows.depth != NULL:
+                    laid.drawn = &room[1, 0]
+                    memcpy(&laid.blank, &farthest, sizeof(float))
+                    K.lay_rows(&laid, <int32_t *>rows.depth, target.width)
         raise_if_given_up()
 
 

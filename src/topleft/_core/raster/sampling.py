@@ -89,22 +89,37 @@ def draw_each(own: SamplePass, targets: list[engine.Target], shape: tuple[int, i
 def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near.
 
-    A picture of one band is drawn whole.
+    Where all targets have so many bytes that they do not stay in a cache, a band is drawn in memory that does. A
+    picture of one band is drawn whole.
     """
     costs = cost_table()
     if own.n_threads == 1 and 8 * shape[0] * shape[1] <= costs.plane_bytes:
         return draw_each(own, targets, shape)
-    bins = own.sort_bands(shape, int(costs.plane_bytes) // 8)
+    is_far = sum(target.n_bytes for target in targets) > costs.far_bytes
+    bins = own.sort_bands(shape, int(costs.plane_bytes) // 8, with_columns=is_far)
     if bins.bad_row >= 0:
         return True
     meshes, n_parts = own.meshes, max(1, min(own.n_threads, bins.n_bands))
-    run_parts(lambda first, end: engine.draw_bands(meshes, targets, bins, first, end), bins.n_bands, n_parts)
+    rooms: list[NDArray[np.int32] | None] = [None] * n_parts
+    if is_far:
+        rooms = list(own.memory.scratch("band rows", (n_parts, 2, (shape[1] + 16) << bins.band_bits), np.int32))
+
+    def draw_part(first: int, end: int) -> None:
+        engine.draw_bands(meshes, targets, rooms.pop(), bins, first, end)
+
+    run_parts(draw_part, bins.n_bands, n_parts)
     return False
 
 
-def band_bytes(n_triangles: int) -> dict[str, int]:
+def band_bytes(n_triangles: int, shape: tuple[int, int], n_bytes: int, n_threads: int) -> dict[str, int]:
     """Return the most bytes of scratch that `draw_sorted` needs, by name."""
-    return {"bins": 12 * (n_triangles + 16), "bands": 4 * (n_triangles + 1)}
+    costs, (height, width) = cost_table(), shape
+    is_far = n_bytes > costs.far_bytes
+    found = {"bins": (20 if is_far else 12) * (n_triangles + 16), "bands": 4 * (n_triangles + 1)}
+    if is_far:
+        band_bits = bits_of_bands(shape, int(costs.plane_bytes) // 8, n_threads)
+        found["band rows"] = 8 * min(n_threads, -(-height >> band_bits)) * ((width + 16) << band_bits)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
