@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import topleft as tl
+from topleft._meshes.picture import placed
+from topleft._meshes.picture.bend import bend
 
 SIZE = (64, 48)
 K = np.array([[60.0, 0, 31.5], [0, 60.0, 23.5], [0, 0, 1]])
@@ -65,6 +67,22 @@ def test_full_masks_are_those_of_the_objects_alone_and_hold_what_shows(lens):
         assert found.visible(i).sum() == found.n_visible[i]
     assert found.rle() == [tl.to_rle(found.visible(i)) for i in range(len(scene))]
     assert found.rle("full") == [tl.to_rle(found.full(i)) for i in range(len(scene))]
+
+
+@pytest.mark.parametrize("lens", [{"distortion": (-0.2, 0.05, 0, 0)}, {"fisheye": (0.1, 0, 0, 0)}])
+def test_a_lens_bends_each_object_once_and_objects_count_beyond_the_picture(lens, monkeypatch):
+    calls = []
+    monkeypatch.setattr(placed, "bend", lambda *args, **options: calls.append(1) or bend(*args, **options))
+    (width, height), mirrored = SIZE, np.diag([-0.5, 0.5, 0.5, 1])
+    mirrored[:3, 3] = 2.5, 1, 0
+    scene = tl.Scene([*strewn(seed=4), (strewn()[0].mesh, mirrored)])
+    camera = tl.Camera.from_intrinsics(K, POSE, SIZE, **lens)
+    found = tl.object_masks(scene, camera, SIZE, cull="back")
+    assert len(calls) == len(scene)
+    around = {"origin": (-width, -height), "viewport": SIZE, "cull": "back"}
+    for i, one in enumerate(scene):
+        alone = tl.rasterize_mesh(tl.Scene([one]), camera, (3 * width, 3 * height), **around).mask
+        assert found.n_full[i] == alone.sum()
 
 
 def test_an_object_round_the_eye_is_cut_at_the_canvas():

@@ -16,14 +16,15 @@ from topleft._core.base.array_types import F64, I32, I64, MeshLike
 from topleft._core.base.arrays import as_array, as_count, as_number, shown
 from topleft._core.base.cached import cached_property
 from topleft._core.base.defaults import DEFAULT_SIZE
-from topleft._core.base.memory import check_fits
+from topleft._core.base.memory import FRESH, check_fits
 from topleft._core.base.options import check_choice
 from topleft._core.raster.rle import RunTable, annotation_of, encode_ids
-from topleft._meshes.camera.camera import Camera, CameraLike
+from topleft._meshes.camera.camera import CameraLike
 from topleft._meshes.camera.matrices import box_corners
 from topleft._meshes.model.normals import moved
 from topleft._meshes.picture.fragments import SceneFragments
-from topleft._meshes.picture.holes import draw_visible
+from topleft._meshes.picture.holes import cuts_of, draw_solid
+from topleft._meshes.picture.placed import Placed
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Instance, Scene
 from topleft.typing import CullOption
@@ -274,19 +275,19 @@ def object_masks(
         raise ValueError(f"beyond must reach at most {MOST_BEYOND_PX} pixels, got {beyond} pictures of {shot.size}")
     whole, (width, height) = shot.scene, shot.size
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    instance, boxes = seen_in(whole, shot.camera, shot.size, options)
+    placed = Placed.parse(Shot(whole, shot.camera, shot.size), options)
+    instance, boxes = seen_in(placed)
     n_visible = np.bincount(instance.reshape(-1) + 1, minlength=len(whole) + 1)[1:].astype(np.int64)
     more_x, more_y = (int(np.ceil(beyond * side)) for side in shot.size)
     canvas = -more_x, -more_y, width + more_x, height + more_y
     windows = []
-    for one in whole:
-        left, top, right, bottom = window_of(one, shot.camera, shot.size, canvas)
+    for i, drawn in enumerate(placed.scene):
+        left, top, right, bottom = window_of(drawn, placed.clip_from_world, shot.size, canvas)
         shape = max(0, bottom - top), max(0, right - left)
         check_fits(shape, np.bool_)
         mask = np.zeros(shape, np.bool_)
         if mask.size:
-            window = options | {"origin": (left, top), "viewport": shot.size}
-            mask = seen_in(Scene([one]), shot.camera, mask.shape[::-1], window)[0] >= 0
+            mask = seen_in(placed.alone(i, (right - left, bottom - top), (left, top)))[0] >= 0
         windows.append(((left, top), mask))
     boxes_full = [
         np.where(mask.any(), np.add(box_of(mask), corner * 2), 0) if mask.size else np.array(NO_BOX)
@@ -299,19 +300,19 @@ def object_masks(
     )
 
 
-def seen_in(scene: Scene, camera: Camera, size: tuple[int, int], options: dict[str, Any]) -> tuple[I32, I32]:
+def seen_in(placed: Placed) -> tuple[I32, I32]:
     """Which instance shows (H, W), without the holes of materials, and the boxes of pixels round each (N, 4)."""
-    return cast(SceneFragments, draw_visible(Shot(scene, camera, size), **options))._found
+    return cast(SceneFragments, draw_solid(FRESH, placed, cuts_of(placed.whole, None)))._found
 
 
-def window_of(instance: Instance, camera: Camera, size: tuple[int, int], canvas: Window) -> Window:
+def window_of(instance: Instance, clip_from_world: F64, size: tuple[int, int], canvas: Window) -> Window:
     """The pixels of the canvas that an instance may cover: round its box, or all where that reaches the eye."""
     if not len(instance.mesh.triangles):
         return NO_BOX
-    if camera.lens is not None or not instance.mesh.is_finite:
+    if not instance.mesh.is_finite:
         return canvas
     corners = moved(box_corners(instance.mesh.vertex_box.reshape(2, 3)), instance.transform)
-    clip = moved(corners, camera.clip_from_world(size)[[0, 1, 3]])
+    clip = moved(corners, clip_from_world[[0, 1, 3]])
     if not (clip[:, 2] > 0).all():
         return canvas
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):

@@ -145,6 +145,13 @@ class Placed:
         """Whether the fragments of the only instance are the fragments of the subject: a mesh without a lens."""
         return self.is_mesh and self.bent is None
 
+    def alone(self, i: int, size: tuple[int, int], origin: tuple[int, int]) -> Placed:
+        """Return one instance before the camera, in a window of the picture; a lens does not bend it again."""
+        scene, view = Scene([self.scene[i]]), self.view.but(size=size, origin=origin)
+        if self.bent is None:
+            return replace(self, scene=scene, whole=scene, view=view)
+        return replace(self, scene=scene, whole=Scene([self.whole[i]]), view=view, bent=(self.bent[i],))
+
     def with_scene(self, scene: Scene) -> Placed:
         """Return another scene before the camera, made for this picture alone: no mesh of it is drawn in clusters."""
         return replace(self, scene=scene, may_cluster=False)
