@@ -215,6 +215,10 @@ TL_KERNEL(void, levels_seen, const tl_levels *array, const float *slopes, int64_
 TL_KERNEL(void, halve_rows, const float *level, int64_t width, int64_t height, int n_channels, int64_t first,
           int64_t end, float *out)
 
+/* Writes rows [first, end) of a picture, of which row 0 is the lowest, and the rows of all levels that they complete.
+ * The rows of a picture come in order. */
+TL_KERNEL(void, write_levels, const tl_picture_levels *picture, int64_t first, int64_t end)
+
 /* Writes colours where labels are not -1: per triangle, or interpolated linearly on the screen from the vertices.
  * n_channels of uint8 or float32 a colour.  `ground`, or NULL, is the colour elsewhere. */
 TL_KERNEL(void, paint_flat, const int32_t *labels, int64_t n, const uint8_t *colors, int pixel_bytes,

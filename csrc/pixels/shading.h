@@ -34,6 +34,17 @@ typedef struct {
     float hand;            /* -1 where the transform mirrors, else 1 */
 } tl_texture;
 
+/* A picture that becomes the texels of a tl_texture, row by row. */
+typedef struct {
+    const uint8_t *image;  /* (height, width, 4), row 0 at v = 1 */
+    const double *light;   /* (2, 256): red, green or blue, and opacity, 0 to 1, of a byte */
+    const int32_t *levels; /* n_levels rows: offset in texels, width, height */
+    int n_levels;
+    int64_t *n_written; /* (n_levels,): rows of each level; 0 before the first call */
+    double *room;       /* 8 numbers for each texel of a row of each level */
+    uint16_t *texels;
+} tl_picture_levels;
+
 /* An array of values and its mipmap levels, row 0 at v = 1. */
 typedef struct {
     const float *texels;

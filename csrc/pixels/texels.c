@@ -10,6 +10,7 @@
 #ifndef TL_TEXELS_C
 #define TL_TEXELS_C
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
@@ -203,6 +204,64 @@ static void halve_rows(const float *level, int64_t width, int64_t height, int n_
                 }
                 out[(row * half + column) * n + k] = (float)sum;
             }
+        }
+    }
+}
+
+/* Adds row i of n to the row of the next level that it is a part of, which `sum` has so far.  Returns whether it is the
+ * last part: `row` is then the row of the next level. */
+static bool add_texel_row(double *restrict row, int64_t i, int64_t n, int64_t n_numbers, double *restrict sum)
+{
+    if (n == 1)
+        return true;
+    const halving last = halving_of((i - 1) / 2, n), next = halving_of(i / 2, n);
+    const int64_t k = i - last.first;
+    const bool is_first = i == next.first && i < n - 1;
+    for (int64_t j = 0; j < n_numbers; j++) {
+        const double value = row[j];
+        row[j] = sum[j] + last.weight[k] * value;
+        sum[j] = is_first ? next.weight[0] * value : row[j];
+    }
+    return i > 0 && k == last.n - 1;
+}
+
+static void halve_texel_row(const double *restrict row, int64_t n, double *restrict out)
+{
+    for (int64_t i = 0; i < (n > 1 ? n / 2 : 1); i++, out += 4) {
+        const halving x = halving_of(i, n);
+        const double *const texel = row + 4 * x.first;
+        for (int k = 0; k < 4; k++)
+            out[k] = x.weight[0] * texel[k];
+        for (int j = 1; j < x.n; j++)
+            for (int k = 0; k < 4; k++)
+                out[k] += x.weight[j] * texel[4 * j + k];
+    }
+}
+
+/* A row of texels in 65535ths, and its first texel again. */
+static void write_texel_row(const double *restrict row, int64_t n, uint16_t *restrict out)
+{
+    for (int64_t j = 0; j < 4 * n; j++)
+        out[j] = (uint16_t)(int32_t)(65535.0 * row[j] + TL_LAST_FRACTION - TL_LAST_FRACTION); /* halves to even */
+    memcpy(out + 4 * n, out, 4 * sizeof *out);
+}
+
+static void write_levels(const tl_picture_levels *picture, int64_t first, int64_t end)
+{
+    const int64_t width = picture->levels[1], height = picture->levels[2];
+    for (int64_t y = first; y < end; y++) {
+        const uint8_t *const bytes = picture->image + 4 * width * (height - 1 - y);
+        double *row = picture->room;
+        for (int64_t j = 0; j < 4 * width; j++)
+            row[j] = picture->light[(j % 4 == 3 ? 256 : 0) + bytes[j]];
+        for (int k = 0;; k++) {
+            const int32_t *const level = picture->levels + 3 * k;
+            const int64_t i = picture->n_written[k]++, n = level[1];
+            write_texel_row(row, n, picture->texels + 4 * (level[0] + i * (n + 1)));
+            if (k + 1 == picture->n_levels || !add_texel_row(row, i, level[2], 4 * n, row + 4 * n))
+                break;
+            halve_texel_row(row, n, row + 8 * n);
+            row += 8 * n;
         }
     }
 }

@@ -159,7 +159,7 @@ paint_gouraud mean_flat mean_colors composite fill_points list_planes fill_plane
 face_normals find_turned face_angles list_corners find_creases sum_creases box_of_faces unit_vectors move_points
 color_rows bend_vertices see_points find_bent split_bent group_rows build_tree set_feet snap_points bound_polygons
 sort_polygons trust_polygons touch_texels average_texels find_in_rows find_gutter copy_texels add_taken grad_sides
-mark_silhouettes"""
+mark_silhouettes write_levels"""
 
 
 def test_each_kernel_is_interrupted_or_ends_first():

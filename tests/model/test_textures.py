@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import one_by_one
+from engine_cases import ON_EACH_ISA, on, one_by_one
+from shading_reference import halved
 
 import topleft as tl
 from topleft._meshes.model import texture as module
@@ -20,18 +21,20 @@ def levels_at_once(image, light):
         parts.append(np.rint(65535 * padded).astype(np.uint16).reshape(-1, 4))
         if max(level.shape[:2]) == 1:
             return np.concatenate([*parts, np.zeros((1, 4), np.uint16)])
-        level = module.halved_along(module.halved_along(level, 0), 1)
+        level = halved(level)
 
 
 @one_by_one("size", [(1, 1), (1, 9), (9, 1), (3, 5), (31, 17), (64, 48), (100, 63), (129, 65), (101, 7)])
-@pytest.mark.parametrize("n_texels", [1, 40, 333, 1 << 17])
+@pytest.mark.parametrize("n_texels", [1, 333, 1 << 17])
 @pytest.mark.parametrize("encoding", ["srgb", "linear"])
-def test_levels_by_blocks_of_rows_are_those_of_the_whole(size, n_texels, encoding, monkeypatch):
+@ON_EACH_ISA
+def test_levels_by_blocks_of_rows_are_those_of_the_whole(isa, size, n_texels, encoding, monkeypatch):
     monkeypatch.setattr(module, "BLOCK_TEXELS", n_texels)
     image = RNG.integers(0, 256, (*size, 4)).astype(np.uint8)
     rows = module.level_rows(size[1], size[0], has_halves=True)
     light = module.LIGHT_OF_BYTE[encoding]
-    assert_same(module.texels_of(image, rows, light=light), levels_at_once(image, light))
+    with on(isa):
+        assert_same(module.texels_of(image, rows, light=light), levels_at_once(image, light))
 
 
 @pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])

@@ -1,13 +1,13 @@
 """Shading in float64 NumPy, as docs/design/shading.md tells it: what the kernels are compared with.
 
-Shares no code with them but the snap and the halvings of textures. All vertices must lie in front of the camera.
+Shares no code with them but the snap. All vertices must lie in front of the camera.
 """
 
 import numpy as np
 
 from topleft._meshes.model.environment import DEFAULT_ENVIRONMENT
 from topleft._meshes.model.normals import face_normals, unit_or_zero
-from topleft._meshes.model.texture import LIGHT_OF_BYTE, halved_along
+from topleft._meshes.model.texture import LIGHT_OF_BYTE
 
 TO_HEADLIGHT = np.array([-0.35, 0.45, 1.0]) / np.linalg.norm([-0.35, 0.45, 1.0])
 
@@ -23,6 +23,18 @@ def light_of_image(rgba, encoding="srgb"):
 def halved(level):
     """The next halving (max(1, H // 2), max(1, W // 2), 4): each texel the mean over its area."""
     return halved_along(halved_along(level, 0), 1)
+
+
+def halved_along(level, axis):
+    """Each value is the mean over its area along an axis: over two values, or, of 2 m + 1, over 2 + 1 / m."""
+    level = np.moveaxis(level, axis, 0)
+    m = len(level) // 2
+    if len(level) % 2 and m:
+        i, share = np.arange(m).reshape(-1, *[1] * (level.ndim - 1)), m / len(level)
+        level = level[:-2:2] * (share * ((m - i) / m)) + level[1::2] * share + level[2::2] * (share * ((i + 1) / m))
+    elif m:
+        level = (level[::2] + level[1::2]) / 2
+    return np.moveaxis(level, 0, axis)
 
 
 def decode(srgb):

@@ -189,6 +189,18 @@ def halve_rows(const float[:, ::1] level, int64_t width, int64_t height, int64_t
             K.halve_rows(&level[0, 0], width, height, <int>level.shape[1], first, end, &out[0, 0])
 
 
+def write_levels(const uint8_t[:, :, ::1] image, const double[:, ::1] light, const int32_t[:, ::1] levels,
+                 int64_t first, int64_t end, int64_t[::1] n_written, double[::1] room, uint16_t[:, ::1] texels):
+    """The kernel `write_levels`."""
+    cdef tl_picture_levels picture
+    if first < end:
+        picture.image, picture.light, picture.levels = &image[0, 0, 0], &light[0, 0], &levels[0, 0]
+        picture.n_levels, picture.n_written = <int>levels.shape[0], &n_written[0]
+        picture.room, picture.texels = &room[0], &texels[0, 0]
+        with nogil:
+            K.write_levels(&picture, first, end)
+
+
 cdef class PixelPoints:
     """`tl_points` of the instances of a picture: positions of vertices, and the kind of value to compute at points."""
 
