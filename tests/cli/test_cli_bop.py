@@ -65,6 +65,18 @@ def test_bop_writes_the_info_of_object_masks(scene, run):
     assert expected[0]["px_count_valid"] < expected[0]["px_count_all"]
 
 
+@pytest.mark.parametrize("scale", ["1", "0.001", "1e3", "0.0254"])
+def test_bop_parts_surfaces_that_are_near_each_other_at_every_scale(scale, scene, run):
+    """Of two cubes with sides 0.02 mm apart at 660 mm the nearer one shows whole."""
+    behind, near = ({"obj_id": 5, "cam_R_m2c": np.eye(3).ravel().tolist(), "cam_t_m2c": [x, 0.0, z]}
+                    for x, z in ((0.0, 700.02), (10.0, 700.0)))  # fmt: skip
+    scene.joinpath("scene/scene_gt.json").write_text(json.dumps({"3": [behind, near]}))
+    assert run("bop", "scene", "--models", "models", "-o", "info.json", "--scale", scale) == (0, [])
+    shares = [one["visib_fract"] for one in json.loads(scene.joinpath("info.json").read_text())["3"]]
+    assert 0 < shares[0] < 0.5
+    assert shares[1] == 1
+
+
 def test_bop_writes_masks_and_annotations(scene, run):
     options = "--coco", "coco.json", "--masks", "masks", "--size", "64x48"
     assert run("bop", "scene", "--models", "models", "-o", "info.json", *options) == (0, [])

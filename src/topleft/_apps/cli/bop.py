@@ -74,12 +74,10 @@ def run_bop(options: argparse.Namespace) -> int:
 def masks_of(
     meshes: list[Mesh], poses: list[Any], intrinsics: Array, frame: tuple[int, int], options: argparse.Namespace
 ) -> ObjectMasks:
-    """Return the masks of an image; planes of the camera lie round all objects."""
+    """Return the masks of an image."""
     for pose in poses:
         pose[:3, 3] *= options.scale
-    scene = Scene(list(zip(meshes, poses, strict=True)))
-    reach = max(float(np.abs(scene.bounds).max()), 1e-6)
-    camera = Camera.from_intrinsics(intrinsics, np.eye(4), frame, near=1e-4 * reach, far=4 * reach)
+    scene, camera = Scene(list(zip(meshes, poses, strict=True))), Camera.from_intrinsics(intrinsics, np.eye(4), frame)
     return object_masks(scene, camera, frame, beyond=options.beyond, threads=options.threads)
 
 
