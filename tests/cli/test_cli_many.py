@@ -18,7 +18,7 @@ from PIL import Image
 
 from topleft import scenes
 from topleft._apps.cli import animation
-from topleft._apps.cli.render import _captions
+from topleft._apps.cli.render import captions_of
 from topleft._apps.cli.sheet import make_sheet, wrapped
 from topleft._apps.cli.targets import MeshJobs, Orbit
 from topleft._meshes.camera.camera import Camera
@@ -333,7 +333,7 @@ def test_sheet_of_several_meshes_has_one_background(run, folder):
 
 def test_sheet_names_meshes_of_one_stem_by_their_folders():
     groups = [MeshJobs(f"{name}/model.obj", f"model-{name}", ()) for name in "ab"] + [MeshJobs("c.obj", "c", ())]
-    assert _captions(groups) == ["a/model.obj", "b/model.obj", "c"]
+    assert captions_of(groups) == ["a/model.obj", "b/model.obj", "c"]
 
 
 def test_sheet_cuts_long_captions_in_front(tmp_path):

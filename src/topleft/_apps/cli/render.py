@@ -84,7 +84,7 @@ def run_render(options: argparse.Namespace) -> int:
                 save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
-            sheet = make_sheet([_color_files(group) for group in groups], _captions(groups), reasons)
+            sheet = make_sheet([_color_files(group) for group in groups], captions_of(groups), reasons)
             save_image(options.sheet, sheet)
     is_broken = any(BROKEN in line for line in lacks)
     return FAILED if failed or is_broken or (options.strict and any(AT_REST not in line for line in lacks)) else 0
@@ -101,7 +101,7 @@ def _reasons(groups: Sequence[MeshJobs], results: Sequence[Result]) -> list[str]
     return reasons
 
 
-def _captions(groups: Sequence[MeshJobs]) -> list[str]:
+def captions_of(groups: Sequence[MeshJobs]) -> list[str]:
     """The name of each mesh, or its file and folder where another mesh has that stem."""
     sources = [group.source for group in groups]
     n_of = Counter(Path(source).stem for source in sources)

@@ -94,7 +94,7 @@ def read_environment(text: str) -> Environment:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class EnvironmentOfFile:
     """The light from all around of an environment; unless `up` is given the axis of the mesh is above."""
 
     environment: Environment
@@ -292,7 +292,7 @@ def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     if options.matcap is not None:
         drawing["matcap"] = read_texture(options.matcap)
     if options.environment is not None:
-        drawing["environment"] = Surroundings(read_environment(options.environment), options.up)
+        drawing["environment"] = EnvironmentOfFile(read_environment(options.environment), options.up)
     if options.opacity is None:
         return drawing | {"edges": options.wireframe, "sampling": options.sampling or default_sampling(options)}
     if options.wireframe or options.sampling not in (None, Sampling.CENTER):
