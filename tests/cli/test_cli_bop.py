@@ -132,7 +132,7 @@ def test_a_folder_that_is_not_as_bop_has_it_is_told_in_one_line(scene, run, brea
     assert not scene.joinpath("info.json").exists()
 
 
-@pytest.mark.parametrize("option", [("--scale", "0"), ("--beyond", "-1"), ("--size", "9")])
+@pytest.mark.parametrize("option", [("--scale", "0"), ("--beyond", "-1"), ("--size", "9x")])
 def test_options_of_bop_are_checked(scene, run, option):
     status, lines = run("bop", "scene", "--models", "models", "-o", "info.json", *option)
     assert status == 2
