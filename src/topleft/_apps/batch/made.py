@@ -36,6 +36,11 @@ class Hash(Protocol):
         """Add bytes."""
 
 
+PLAIN = frozenset([type(None), bool, int, float, complex, str, bytes, range])
+PLAIN_KINDS = (Enum, np.generic)
+"""Types of values whose `repr` tells them."""
+
+
 class Contents:
     """The contents of what pictures are made of, as digests.
 
@@ -63,9 +68,9 @@ class Contents:
     def _add(self, found: Hash, part: object) -> None:
         """Add the content of a value to a digest; a `TypeError` for one that has none that can be told."""
         found.update(f"{type(part).__module__}.{type(part).__qualname__}(".encode())
-        if part is None or isinstance(part, bool | int | float | complex | str | bytes | Enum | np.generic | range):
+        if type(part) in PLAIN or isinstance(part, PLAIN_KINDS):
             found.update(repr(part).encode(errors="surrogatepass"))
-        elif isinstance(part, tuple | list):
+        elif isinstance(part, (tuple, list)):
             for one in part:
                 self._add(found, one)
         elif isinstance(part, os.PathLike):
