@@ -258,7 +258,7 @@ def test_job_file_broken_is_one_line_and_status_2(run, folder, name, text, line)
         ('{"out": "a"}', "mesh must be a name or a list of"),
         ('{"mesh": [1]}', "mesh must be a name or a list of"),
         ('{"mesh": "cube", "colour": 1}', "there is no key 'colour'"),
-        ('{"mesh": "cube", "size": [1]}', "argument --size: must be"),
+        ('{"mesh": "cube", "size": [0]}', "argument --size: must be"),
         ('{"mesh": "cube", "ortho": 1}', "ortho must be true or fal"),
         ('{"mesh": "cube", "fov": {}}', "fov must be text, a number"),
         ('{"mesh": "cube", "jobs": 2}', "there is no key 'jobs'"),
