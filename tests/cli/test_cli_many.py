@@ -14,6 +14,7 @@ from multiprocessing import get_all_start_methods
 import numpy as np
 import pytest
 from first_pictures import camera_of, first_picture, shape_of
+from gltf_files import GltfFile
 from PIL import Image
 
 from topleft import scenes
@@ -451,6 +452,76 @@ def test_animation_of_several_meshes_is_one_for_each(run, folder):
     arguments = ["--animation", "{name}.webp", "-o", "p/", "--views", 2, *SMALL]
     assert run("render", "cube", "torus", *arguments) == (0, [])
     assert [name for name in names(folder) if name.endswith("webp")] == ["cube.webp", "torus.webp"]
+
+
+def moving(folder, is_camera_there=False):
+    """A triangle that goes 3 to the right in half a second; a second clip turns it over for one second."""
+    camera = {"type": "orthographic", "orthographic": {"xmag": 4, "ymag": 4, "znear": 1, "zfar": 9}}
+    file = GltfFile(cameras=[camera]) if is_camera_there else GltfFile()
+    file.shown()
+    if is_camera_there:
+        file.node(camera=0, translation=[0, 0, 5])
+    keys = {"translation": ([0.0, 0.5], [[0.0, 0, 0], [3, 0, 0]]), "scale": ([0.0, 1.0], [[1.0, 1, 1], [1, -1, 1]])}
+    for path, (times, values) in keys.items():
+        sampler = {"input": file.accessor(times), "output": file.accessor(values)}
+        channel = {"sampler": 0, "target": {"node": 0, "path": path}}
+        file.add("animations", {"name": path, "samplers": [sampler], "channels": [channel]})
+    (folder / "a.glb").write_bytes(file.glb())
+
+
+@pytest.mark.parametrize(("clip", "n"), [((), 6), (("--clip", "translation"), 6), (("--clip", 1), 11)])
+def test_animation_of_an_animated_file_shows_its_clip(run, folder, clip, n):
+    moving(folder)
+    look = ["--fps", 10, "--background", "transparent", "--cull", "none"]
+    assert run("render", "a.glb", "--animation", "a.apng", "-o", "p/", *look, *clip, *SMALL)[0] == 0
+    assert names(folder) == ["a.apng", "a.glb", *(f"p/a-{i:03d}.png" for i in range(n))]
+    frames = [pixels(f"p/a-{i:03d}.png") for i in range(n)]
+    assert len({frame.tobytes() for frame in frames}) == n
+    assert not any(frame[..., 3][edge].any() for frame in frames for edge in (0, -1, (..., 0), (..., -1)))
+    with Image.open("a.apng") as image:
+        assert image.n_frames == n
+
+
+def test_animation_of_a_clip_is_the_file_at_its_times(run, folder):
+    moving(folder, is_camera_there=True)
+    look = ["--camera", 0, "--clip", 0, *SMALL]
+    assert run("render", "a.glb", "--animation", "a.apng", "-o", "p/", "--fps", 10, *look) == (0, [])
+    for i in range(6):
+        assert run("render", "a.glb", "--time", i / 10, "-o", "b.png", *look) == (0, [])
+        assert np.array_equal(pixels(f"p/a-{i:03d}.png"), pixels("b.png"))
+
+
+@pytest.mark.parametrize("still", [("--views", 2), ("--views", 2, "--time", 0.5)])
+def test_animation_of_several_views_of_an_animated_file_is_an_orbit(run, folder, still):
+    moving(folder)
+    assert run("render", "a.glb", "--animation", "a.apng", *still, *SMALL)[0] == 0
+    with Image.open("a.apng") as image:
+        assert image.n_frames == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--clip", "x"], "clip must be 0 to 1, or one of 'translation', 'scale', got 'x'"),
+        (["--clip", 0, "--views", 2], "topleft: --clip needs --time: which second of it, or --animation without"),
+    ],
+)
+def test_animation_of_no_such_clip_is_one_line_and_status_2(run, folder, arguments, line):
+    moving(folder)
+    status, lines = run("render", "a.glb", "--animation", "a.gif", *arguments, *SMALL)
+    assert (status, len(lines)) == (2, 1)
+    assert line in lines[0]
+
+
+def test_animation_of_endless_keys_is_refused(run, folder):
+    file = GltfFile().shown()
+    sampler = {"input": file.accessor([0.0, 1e30]), "output": file.accessor([[0.0, 0, 0], [3, 0, 0]])}
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    file.add("animations", {"samplers": [sampler], "channels": [channel]})
+    (folder / "a.glb").write_bytes(file.glb())
+    status, lines = run("render", "a.glb", "--animation", "a.gif", *SMALL)
+    assert status == 2
+    assert "frames, more than 100,000: lower --fps" in lines[0]
 
 
 def test_animation_of_a_mesh_that_failed_is_left_out(run, folder):

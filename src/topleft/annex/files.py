@@ -7,6 +7,7 @@ from topleft._meshes.io.images import read_record, write_image
 from topleft._meshes.io.layer_files import layer_paths, save_layers
 from topleft._meshes.io.limits.budget import LIMITS, Budget
 from topleft._meshes.io.limits.npy import arrays_of
+from topleft._meshes.io.load import clip_length
 from topleft._meshes.io.polygon_files import NO_RINGS, PolygonPicture, has_polygons, load_polygons
 from topleft._meshes.io.references import read_picture
 
@@ -18,6 +19,7 @@ __all__ = [
     "annotation_members",
     "annotation_of",
     "arrays_of",
+    "clip_length",
     "encode_polygons",
     "has_polygons",
     "layer_paths",

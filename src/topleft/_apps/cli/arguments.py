@@ -65,6 +65,10 @@ outside of jobs, and options of the command line, hold unless a job has its own:
   out = "thumbs/{{name}}-{{view}}.png"              "out": "thumbs/{{name}}-{{view}}.png",
   views = 12                                     "views": 12}}]}}
 
+--animation of a glTF file that has animations shows one of them from 0 to its end, --fps frames a second, by one
+camera. With --views the mesh stands still, at rest or at --time, and the camera goes around it, as with files that have
+no animations.
+
 The mesh fills 95 % of the frame; with --views the camera keeps its distance, so the mesh keeps its size. One line at
 the end lists the parts of files that meshes lack, missing textures, say.
 
@@ -171,9 +175,10 @@ def add_render_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--animation",
         metavar="FILE",
-        help=f"the views of a mesh one after the other ({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}",
+        help="the clip of an animated file, which --clip chooses, or --views of other meshes one after the other "
+        f"({{name}} of the mesh): {' '.join(ANIMATION_SUFFIXES)}; see below",
     )
-    add("--fps", type=RATE, default=20.0, metavar="N", help="views a second of an animation (default 20)")
+    add("--fps", type=RATE, default=20.0, metavar="N", help="frames a second of an animation (default 20)")
 
 
 def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
@@ -197,7 +202,7 @@ def add_picture_arguments(parser: argparse.ArgumentParser) -> None:
         help="units of a step of distances in PNG, as BOP has it: 1 for millimetres (default 0.001: of metres)",
     )
     add("--time", type=SECONDS, metavar="SECONDS", help="of an animation of a glTF file (default: at rest)")
-    add("--clip", type=_clip, metavar="N|NAME|all", help="which animation --time is of, from 0 (default the first)")
+    add("--clip", type=_clip, metavar="N|NAME|all", help="the animation of a file, from 0 (default the first)")
     add_scale(parser)
     add(
         "--threads",

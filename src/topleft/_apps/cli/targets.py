@@ -20,13 +20,15 @@ import numpy as np
 from topleft import Camera, Environment, Material, Mesh, Points, Texture, load, load_cameras
 from topleft._apps.batch.jobs import Job
 from topleft._apps.batch.made import FromFile
-from topleft._apps.cli.arguments import UsageError, meant
+from topleft._apps.cli.arguments import MAX_VIEWS, UsageError, meant
+from topleft._apps.cli.report import TOLD
+from topleft._core.base.array_types import Array
 from topleft._core.base.color import DEFAULT_COLOR
 from topleft._core.base.defaults import DEFAULT_CREASE, DEFAULT_POINT_SIZE, SUFFIXES
 from topleft._core.base.options import Sampling
 from topleft._core.base.remote import Location, RemotePath, location_of
 from topleft._core.base.whole_file import remove_stale_parts
-from topleft.annex.files import LIMITS, read_picture
+from topleft.annex.files import LIMITS, clip_length, read_picture
 from topleft.errors import MeshError, MissingPackageError
 from topleft.scenes import SHAPES, shape
 
@@ -122,8 +124,8 @@ class Orbit:
     ortho: bool
     fits: bool = True
 
-    def __call__(self, mesh: Mesh | Points, size: tuple[int, int]) -> Camera:
-        """Return it."""
+    def __call__(self, mesh: Mesh | Points | Array, size: tuple[int, int]) -> Camera:
+        """Return it; of an array the camera of these points (N, 3)."""
         return Camera.framing(
             mesh,
             azimuth_deg=self.azimuth_deg,
@@ -133,6 +135,33 @@ class Orbit:
             ortho=self.ortho,
             aspect=size[0] / size[1],
             fit="silhouette" if self.fits else "sphere",
+        )
+
+
+MOMENTS_TO_FRAME = 5
+"""Moments of a clip that its camera frames, from the first to the last: a full turn has four sides."""
+
+
+@dataclass(frozen=True)
+class ClipOrbit:
+    """The camera of all frames of a clip; `meshes` are those of some moments, all of which it shows."""
+
+    orbit: Orbit
+    meshes: tuple[MeshSource, ...]
+
+    def __call__(self, mesh: Mesh | Points, size: tuple[int, int]) -> Camera:  # noqa: ARG002
+        """Return it."""
+        return self.orbit(self._points, size)
+
+    @cached_property
+    def _points(self) -> Array:
+        """The vertices in use of all meshes, (N, 3)."""
+        meshes = [mesh() for mesh in self.meshes]
+        return np.concatenate(
+            [
+                mesh.positions if isinstance(mesh, Points) else mesh.vertices[np.unique(mesh.triangles)]
+                for mesh in meshes
+            ]
         )
 
 
@@ -204,34 +233,64 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
     """Return the jobs of each mesh of the arguments; `start` is the index of the first mesh."""
     if options.camera is not None and options.views > 1:
         raise UsageError("--camera does not go with --views: a camera of a file stands still")
-    if options.clip is not None and options.time is None:
-        raise UsageError("--clip needs --time: which second of it")
-    pattern = _pattern(options.out, options)
+    is_played = bool(options.animation) and options.time is None and options.views == 1
+    if options.clip is not None and options.time is None and not is_played:
+        raise UsageError("--clip needs --time: which second of it, or --animation without --views")
     drawing = _render_options(options)
     limits = tuple((name, getattr(options, name)) for name in (*LIMITS, "root"))
+    moments = [
+        _moments(source, options, dict(limits)) if is_played else (options.time,) * options.views
+        for source in options.meshes
+    ]
+    pattern = _pattern(options.out, options, has_views=any(len(times) > 1 for times in moments))
     groups = []
     names = names_of(options.meshes, with_numbers="{index}" not in pattern, with_folders="{folder}" in pattern)
     folders = folders_of(options.meshes)
     for i_mesh, source in enumerate(options.meshes, start):
         name = names[i_mesh - start]
-        moment = options.time, options.clip, options.scale
-        mesh = MeshSource(source, options.texture, options.crease, options.point_size, *moment, limits)
+        times = moments[i_mesh - start]
+        meshes = [
+            MeshSource(
+                source, options.texture, options.crease, options.point_size, time, options.clip, options.scale, limits
+            )
+            for time in times
+        ]
+        steps = [i * (len(meshes) - 1) // (MOMENTS_TO_FRAME - 1) for i in range(MOMENTS_TO_FRAME)]
+        of_clip = ClipOrbit(_orbit(options, 0), tuple(meshes[i] for i in dict.fromkeys(steps)))
         jobs = []
-        for i_view in range(options.views):
+        for i_view, (time, mesh) in enumerate(zip(times, meshes, strict=True)):
             # Not str.format: a folder may have other braces in its name.
             filled = pattern.replace("{view}", f"{i_view:03d}").replace("{index}", f"{i_mesh:03d}")
             filled = filled.replace("{folder}", folders[i_mesh - start])
-            azimuth_deg = options.azimuth + 360 * i_view / options.views
-            camera: Orbit | FileCamera = Orbit(
-                azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=options.views == 1
-            )
+            camera: Orbit | ClipOrbit | FileCamera = of_clip if len(times) > options.views else _orbit(options, i_view)
             if options.camera is not None:
-                camera = FileCamera(source, options.camera, *moment)
+                camera = FileCamera(source, options.camera, time, options.clip, options.scale)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
             jobs.append(Job(mesh, camera, options.size, drawing, path, layers, depth_scale=options.depth_scale))
         groups.append(MeshJobs(source, name, tuple(jobs)))
     return groups
+
+
+def _orbit(options: argparse.Namespace, i_view: int) -> Orbit:
+    """The camera of a view."""
+    azimuth_deg, has_one_view = options.azimuth + 360 * i_view / options.views, options.views == 1
+    return Orbit(azimuth_deg, options.elevation, options.fov, options.up, options.ortho, fits=has_one_view)
+
+
+def _moments(source: str, options: argparse.Namespace, limits: Mapping[str, Any]) -> tuple[float | None, ...]:
+    """The times of the frames of a mesh, seconds: None alone for one without animations, which is at rest."""
+    seconds: float | None
+    try:
+        seconds = None if source in SHAPES else clip_length(source, options.clip, **limits)
+    except TOLD:
+        seconds = 0.0  # its job meets the error again, and tells it
+    if seconds is None:
+        return (None,) if options.clip is None else (0.0,)
+    n_frames = int(seconds * options.fps + 1e-6) + 1  # keys are float32: 0.1 s is 0.10000000149
+    if n_frames > MAX_VIEWS:
+        raise UsageError(f"--animation of {source!r} has {n_frames:,} frames, more than {MAX_VIEWS:,}: lower --fps")
+    return tuple(i / options.fps for i in range(n_frames))
 
 
 def names_of(sources: Sequence[str], *, with_numbers: bool = True, with_folders: bool = False) -> list[str]:
@@ -309,7 +368,7 @@ def _layers(path: str, options: argparse.Namespace) -> tuple[str, ...]:
     return tuple(options.layers)
 
 
-def _pattern(out: str, options: argparse.Namespace) -> str:
+def _pattern(out: str, options: argparse.Namespace, *, has_views: bool) -> str:
     """OUT as a file name with {name}, {view}, {index} and {layer} where several pictures need them."""
     path = location_of(out)
     check_words("OUT", path, ("name", "folder", "view", "index", "layer"))
@@ -322,12 +381,12 @@ def _pattern(out: str, options: argparse.Namespace) -> str:
         raise UsageError(f"OUT must end in one of {' '.join(SUFFIXES)}, or in / for a folder, got {out!r}")
     several_layers = len(options.layers) > 1 and path.suffix.lower() != ".npz"
     if is_folder:
-        words = ["{name}"] + ["{view}"] * (options.views > 1) + ["{layer}"] * several_layers
+        words = ["{name}"] + ["{view}"] * has_views + ["{layer}"] * several_layers
         return str(path / ("-".join(words) + ".png"))
     if len(options.meshes) > 1 and "{name}" not in out and "{index}" not in out:
         raise UsageError(f"several meshes need a folder or {{name}} in OUT, got {out!r}")
     stem = path.stem
-    if options.views > 1 and "{view}" not in out:
+    if has_views and "{view}" not in out:
         stem += "-{view}"
     if several_layers and "{layer}" not in out:
         stem += "-{layer}"

@@ -143,20 +143,43 @@ def load(
     [[0, 1, 2]]
     """
     crease, scale = as_crease(crease), as_scale(scale)
-    checked = as_path("path", path)
-    budget = Budget(
-        str(checked), max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
+    source = _input_file(
+        path, root, max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
         max_nodes=max_nodes, max_lines=max_lines, max_bytes=max_bytes, max_unpacked_bytes=max_unpacked_bytes,
     )  # fmt: skip
-    home = None if root is None else as_path("root", root)
-    if home is not None and not home.is_dir():
-        raise ValueError(f"root must be a folder, got {str(home)!r}")
-    source = InputFile(checked, budget, home=home)
     source.moment = as_moment(time, clip)
     mesh = reading(source, lambda: _mesh(source, crease))
     tell_files(source.files())
     tell(source.notes.lines, stacklevel=2)
     return mesh if scale == 1 else scaled(mesh, scale)
+
+
+def clip_length(
+    path: str | os.PathLike[str],
+    clip: int | str | None = None,
+    *,
+    root: str | os.PathLike[str] | None = None,
+    **limits: int | None,
+) -> float | None:
+    """The seconds of an animation of a file, as `load` chooses it; None of a file without animations.
+
+    Errors are those of `load`.
+    """
+    source = _input_file(path, root, **limits)
+    if source.path.suffix.lower() not in GLTF_SUFFIXES:
+        return None
+    from topleft._meshes.io.gltf.reader import read_length  # as late as in `_parts`
+
+    return reading(source, lambda: read_length(source, clip))
+
+
+def _input_file(path: str | os.PathLike[str], root: str | os.PathLike[str] | None, **limits: int | None) -> InputFile:
+    """The file of a path, its budget, and the folder whose files it may name, too."""
+    checked = as_path("path", path)
+    home = None if root is None else as_path("root", root)
+    if home is not None and not home.is_dir():
+        raise ValueError(f"root must be a folder, got {str(home)!r}")
+    return InputFile(checked, Budget(str(checked), **limits), home=home)
 
 
 def scaled(mesh: Mesh | Points, scale: float) -> Mesh | Points:

@@ -88,15 +88,33 @@ def chosen(tree: Tree, rows: list[Any], clip: int | str | None, source: InputFil
     raise MeshError(f"cannot read {str(source.path)!r}: clip must be {span}, or one of {some}, got {clip!r}")
 
 
+def length_of(animations: list[Tree], accessors: Accessors, source: InputFile) -> float:
+    """The seconds from 0 to the last key of a node in animations."""
+    last = 0.0
+    for animation in animations:
+        channels = [channel for channel in animation["channels"] if "node" in channel["target"]]
+        for sampler in {channel.get("sampler"): None for channel in channels}:
+            row = entry(animation, "samplers", sampler)
+            source.budget.spend("max_vertices", accessors.shape(row.get("input"))[0])
+            last = max(last, float(keys_of(row, accessors)[-1]))
+    return last
+
+
+def keys_of(sampler: Tree, accessors: Accessors) -> F64:
+    """The seconds (N,) of the keys of a sampler, one or more."""
+    keys = accessors.array(sampler.get("input")).astype(np.float64).ravel()
+    if not len(keys) or not (np.isfinite(keys).all() and (np.diff(keys) >= 0).all()):
+        raise MeshError("an animation is broken: its keys do not go up")
+    return keys
+
+
 def value_at(sampler: Tree, accessors: Accessors, time: float, path: str, n_numbers: int) -> F64:
     """The `n_numbers` values (C,) of a sampler at a time; the two keys about it are decoded, and no others."""
     kind = sampler.get("interpolation", "LINEAR")
     if kind not in N_PARTS:
         raise MeshError(f"an animation has the interpolation {kind!r}"[:120])
-    keys = accessors.array(sampler.get("input")).astype(np.float64).ravel()
+    keys = keys_of(sampler, accessors)
     n, n_parts = len(keys), N_PARTS[kind]
-    if not n or not (np.isfinite(keys).all() and (np.diff(keys) >= 0).all()):
-        raise MeshError("an animation is broken: its keys do not go up")
     n_rows, n_columns = accessors.shape(sampler.get("output"))
     if n_rows * n_columns != n * n_parts * n_numbers or n_rows % n:
         wish = f"{n_numbers} morph targets" if path == "weights" else path

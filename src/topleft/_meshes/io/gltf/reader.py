@@ -23,7 +23,7 @@ from topleft._core import engine
 from topleft._core.base.array_types import F64, Array
 from topleft._core.base.color import encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, normalized
-from topleft._meshes.io.gltf.animations import n_targets_of, posed
+from topleft._meshes.io.gltf.animations import chosen, length_of, n_targets_of, posed
 from topleft._meshes.io.gltf.draco import DracoSize, declared_by_draco
 from topleft._meshes.io.gltf.materials import Materials
 from topleft._meshes.io.references import Cloud, InputFile
@@ -83,6 +83,14 @@ def read_gltf(source: InputFile) -> list[Mesh]:
     elif tree.get("animations"):
         source.notes.add("animations not played: everything is at rest")
     return list(_Reader(tree, accessors, Materials(tree, accessors, source), source).parts())
+
+
+def read_length(source: InputFile, clip: int | str | None) -> float | None:
+    """The seconds of an animation of a glTF or GLB file; None of a file without animations."""
+    tree, blob = _tree_and_blob(source)
+    if not tree.get("animations"):
+        return None
+    return length_of(chosen(tree, tree["animations"], clip, source), Accessors(tree, blob, source), source)
 
 
 def read_cameras(source: InputFile) -> list[CameraOfFile]:
