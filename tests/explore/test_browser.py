@@ -225,6 +225,13 @@ def test_methods_and_rules_are_switched(page):
     check_pictures(page)
 
 
+def test_failure_scene_opens_on_a_pixel_that_fails(page):
+    pixels_of(page).locator("[data-name=scene]").select_option("any-gap")
+    page.wait_for_function("() => document.querySelector('.why').textContent.includes(\"triangle 1's: a gap\")")
+    ring = page.locator('[data-key="a"] .ring')
+    assert [ring.get_attribute(name) for name in ("x", "y", "width")] == ["6", "11", "1"]
+
+
 def test_hovered_pixel_says_whose_it_is(page):
     box = page.locator('[data-key="b"] svg').bounding_box()
     cell = box["width"] / 18
@@ -429,10 +436,10 @@ def test_fans_have_six_screen_pixels_a_pixel_and_words_keep_apart(chromium, expl
 
 
 def test_counts_add_up(page):
-    """The kinds of wrong pixels are all that are wrong; those of the difference all that either draws."""
-    told = page.inner_text('[data-key="b"] figcaption')
-    n, kinds = re.search(r"([\d,]+) wrong: (.*)", told).groups()
-    assert int(n) == sum(map(int, re.findall(r"(\d+) ", kinds + " ")))
+    """Kinds of pixels are all that a method draws; those of the difference all that either draws."""
+    told = page.inner_text('[data-key="b"] .bad')
+    n, kinds = re.fullmatch(r"(\d+) pixels drawn: (.*)", told).groups()
+    assert int(n) == sum(map(int, re.findall(r"\d+", kinds)))
     n, whole = re.search(
         r"(\d+) of (\d+) pixels differ", page.inner_text('[data-key="difference"] figcaption')
     ).groups()

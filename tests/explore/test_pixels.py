@@ -28,6 +28,7 @@ DEEP = SQUARE | {
     "vertices": [[1, 1, 0.5], [9, 1, 0.5], [1, 9, 0.5], [9, 9, 0.0], [0, 9, 0.9]],
     "triangles": [[0, 3, 2], [1, 3, 4]],
 }
+WEDGE = {"vertices": [[1.4, 1.4], [9.4, 1.4], [1.4, 5.4]], "triangles": [[0, 1, 2]], "size": [11, 7]}
 LOOKS = ["owners", "overdraw", "wireframe"]
 
 
@@ -134,19 +135,50 @@ def test_failure_scene_shows_the_failure_and_the_exact_picture(draw, name):
     wanted = picture(found.expected)
     exact = panels["exact"]["owners" if found.kind == "wrong" else "counts"]
     assert (exact == np.where(wanted < 0, -1 if found.kind == "wrong" else 0, wanted)).all()
-    assert panels["a"]["n_wrong"] > 0
+    x, y = panels["difference"]["pixel"]
+    drawn = [(panels[key]["owners"][y, x], panels[key]["counts"][y, x]) for key in ("a", "exact")]
+    assert drawn[0] != drawn[1]
+
+
+def test_pixel_that_differs_is_the_nearest_to_the_middle(page, draw):
+    panels = draw(SQUARE | {"other": "bresenham_scanline"})
+    is_other = (panels["a"]["owners"] != panels["b"]["owners"]) | (panels["a"]["counts"] != panels["b"]["counts"])
+    y, x = np.nonzero(is_other)
+    far = np.hypot(x - 5, y - 5)
+    nearest = panels["difference"]["pixel"]
+    assert is_other[nearest[1], nearest[0]]
+    assert np.hypot(nearest[0] - 5, nearest[1] - 5) == far.min()
+    assert draw(SQUARE | {"other": "scanline"})["difference"]["pixel"] is None
+
+
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [
+        (SQUARE, "64 pixels drawn"),
+        (SQUARE | {"exact": True}, "64 pixels drawn, all exact"),
+        (SQUARE | {"triangles": [[0, 1, 2], [1, 3, 2], [0, 1, 2]]}, "64 pixels drawn: 28 once, 36 more often"),
+        (scene("shared-edge") | {"method": "bresenham_scanline"},
+         "110 pixels drawn: 64 exact, 20 too many, 26 drawn too often"),
+        (scene("any-overdraw-2"), "63 pixels drawn: 51 exact, 6 too many, 6 of another triangle; 3 missing"),
+        (scene("far-1e10-gap"), "0 pixels drawn; 28 missing"),
+        (WEDGE | {"subpixel_bits": 0, "sampling": "msaa4", "exact": True},
+         "20 pixels drawn: 4 exact, 10 too many, 5 covered too little, 1 of another triangle; 3 missing"),
+    ],
+)  # fmt: skip
+def test_pixels_of_a_picture_are_told_in_one_sentence(draw, state, told):
+    assert draw(state)["a"]["facts"][0][0] == told
 
 
 def test_winding_turns_all_triangles_one_way(draw):
     for winding, cull in (("clockwise", "front"), ("counter-clockwise", "back")):
-        assert draw(SQUARE | {"winding": winding, "cull": cull})["a"]["n"] == 64
-    assert draw(SQUARE | {"winding": "clockwise", "cull": "back"})["a"]["n"] == 0
+        assert draw(SQUARE | {"winding": winding, "cull": cull})["a"]["facts"][0][0] == "64 pixels drawn"
+    assert draw(SQUARE | {"winding": "clockwise", "cull": "back"})["a"]["facts"][0][0] == "0 pixels drawn"
 
 
 def test_limit_of_a_classic_is_told_beside_the_other_pictures(draw):
     far = SQUARE | {"vertices": [[1, 1], [2.0**40, 1], [1, 9], [9, 9]], "other": "bresenham_scanline"}
     panels = draw(far)
-    assert "n" in panels["a"]
+    assert "owners" in panels["a"]
     assert "within 2097152 pixels" in panels["b"]["refused"]
 
 

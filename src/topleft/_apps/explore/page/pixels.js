@@ -98,29 +98,41 @@ export function differenceOf(one, two) {
 // ---- words -----------------------------------------------------------------------------------------------------
 
 const grouped = (n) => n.toLocaleString("en-US");
-function tally(kinds) {
-  const counts = DIFFERENCES.map(() => 0);
+function tally(kinds, n = DIFFERENCES.length) {
+  const counts = Array(n).fill(0);
   for (const kind of kinds) counts[kind]++;
   return counts;
 }
 const sumOf = (counts, first) => counts.slice(first).reduce((a, b) => a + b);
+const countsOf = (counts, words) => words.flatMap((word, k) => word && counts[k] ? [`${grouped(counts[k])} ${word}`] : []).join(", ");
 
 // What is written over and below a picture.
-function described(drawing, {look}) {
-  const ms = 1e3 * drawing.seconds, n = drawing.shares.reduce((sum, share) => sum + (share > 0), 0);
-  const n_twice = drawing.counts.reduce((sum, count) => sum + (count > 1), 0);
-  const facts = [[`${grouped(n)} px`, "n", "pixels that are drawn at least once"],
-    [ms >= 1 ? `${ms.toFixed(1)} ms` : `${(1e3 * ms).toFixed(0)} µs`, "n", "of the call that draws it"]];
-  if (n_twice) facts.push([`${grouped(n_twice)} of them more than once`, "n", "drawn for several triangles"]);
-  const legend = look === "overdraw" ? ["once", "twice", "3 times", "4 or more"].map((word, i) => [css(HEAT[i + 1]), word]) : [];
-  return {n, n_twice, notes: drawing.notes.join(", "), facts, legend};
+function described({counts, notes, seconds}, {look}) {
+  const ms = 1e3 * seconds, facts = [[ms >= 1 ? `${ms.toFixed(1)} ms` : `${(1e3 * ms).toFixed(0)} µs`, "n", "of the call that draws it"]];
+  const often = tally(counts.map((n) => Math.min(n, HEAT.length - 1)), HEAT.length), words = ["once", "twice", "3 times", "4 times or more"];
+  const legend = look === "overdraw" ? words.map((word, i) => [css(HEAT[i + 1]), `${grouped(often[i + 1])} ${word}`]) : [];
+  return {notes: notes.join(", "), facts, legend};
 }
 
-// How many pixels are wrong, of each kind; the kinds add up.
-function wrongOf(counts) {
-  const n = sumOf(counts, 2), words = ["too many", "missing", "of another triangle", "drawn too often"];
-  const kinds = words.flatMap((word, i) => counts[i + 2] ? [`${grouped(counts[i + 2])} ${word}`] : []);
-  return n ? [`${grouped(n)} wrong: ${kinds.join(", ")}`, "bad", BESIDE_EXACT] : ["all exact", "good", BESIDE_EXACT];
+// Counts the pixels of a drawing: numbers before the semicolon add up. `kinds` are its differences from the exact drawing.
+function sentenceOfPixels({counts, shares}, kinds) {
+  const isDrawn = (_, i) => shares[i] > 0, often = tally(counts.filter(isDrawn).map((n) => Math.min(n, 2)), 3), n = sumOf(often, 0);
+  const start = `${grouped(n)} pixels drawn`, title = "drawn for at least one triangle";
+  if (!kinds) return [often[2] ? `${start}: ${countsOf(often, ["", "once", "more often"])}` : start, "n", title];
+  const drawn = tally(kinds.filter(isDrawn)), n_missing = tally(kinds)[3] - drawn[3];
+  if (drawn[1] === n && !n_missing) return [`${start}, all exact`, "good", BESIDE_EXACT];
+  const words = countsOf(drawn, ["", "exact", "too many", "covered too little", "of another triangle", "drawn too often"]);
+  return [`${start}${words && ": "}${words}${n_missing ? `; ${grouped(n_missing)} missing` : ""}`, "bad", BESIDE_EXACT];
+}
+
+// The pixel nearest to the middle of those that differ, [x, y]; null where none does.
+function nearestDifference(kinds, [width, height]) {
+  let nearest = null, least = Infinity;
+  for (const [i, kind] of kinds.entries()) {
+    const x = i % width, y = Math.floor(i / width), far = Math.hypot(x - (width >> 1), y - (height >> 1));
+    if (kind > 1 && far < least) [nearest, least] = [[x, y], far];
+  }
+  return nearest;
 }
 
 // What is written over and below a difference.
@@ -135,7 +147,7 @@ function compared(counts, [a, b]) {
 const panelOf = (key, title) => ({key, title, notes: "", facts: [], legend: [], refused: ""});
 
 // Promises {panels, samples}: pictures of a state, of its methods, the exact one, and where they differ, with what is written
-// over and below them, or why there is none; and where samples lie in each pixel, 0 to 1.
+// over and below them, or why there is none, and a pixel that differs; and where samples lie in each pixel, 0 to 1.
 export async function drawPixels(line, hello, given) {
   const state = parseState(given, hello), {size, look} = state;
   const names = {a: state.method, ...look === "wireframe" ? {} : {...state.other && {b: state.other}, ...state.exact && {exact: EXACT}}};
@@ -154,15 +166,16 @@ export async function drawPixels(line, hello, given) {
     }
   }));
   const drawn = keys.filter((key) => drawings[key]);
-  if (drawings.exact) for (const [k, key] of keys.entries()) {
-    if (key === EXACT || !drawings[key]) continue;
-    const counts = tally(differenceOf(drawings[key], drawings.exact));
-    panels[k].n_wrong = sumOf(counts, 2);
-    panels[k].facts.push(wrongOf(counts));
+  for (const [k, key] of keys.entries()) {
+    const kinds = key !== EXACT && drawings[key] && drawings.exact ? differenceOf(drawings[key], drawings.exact) : null;
+    if (drawings[key]) panels[k].facts.unshift(sentenceOfPixels(drawings[key], kinds));
   }
   if (drawn.length > 1) {
     const pair = drawn.slice(0, 2), kinds = differenceOf(...pair.map((key) => drawings[key]));
-    panels.push({...panelOf("difference", "difference"), ...compared(tally(kinds), pair.map((key) => names[key])), picture: painted(size, (i) => DIFFERENCES[kinds[i]])});
+    panels.push({
+      ...panelOf("difference", "difference"), ...compared(tally(kinds), pair.map((key) => names[key])),
+      picture: painted(size, (i) => DIFFERENCES[kinds[i]]), pixel: nearestDifference(kinds, size),
+    });
   }
   return {panels, samples: isCoverage(state) ? [] : hello.samples[state.n_samples].map((at) => at.map((x) => 0.5 + x / 16))};
 }

@@ -32,6 +32,7 @@ export function pixelsPart(app, panel) {
     try {
       const [pictures] = await Promise.all([drawPixels(app.line, app.hello, asked), app.line.ask("pixels.moved", {vertices: asked.vertices})]);
       show(pictures);
+      if (!pixel && asked === state) inspect(pictures.panels.at(-1).pixel ?? state.size.map((n) => n >> 1));
       if (isRefused) app.say("");
       isRefused = false;
     } catch (error) {
@@ -61,7 +62,7 @@ export function pixelsPart(app, panel) {
   }
   function restore(given) {
     [past, corner, chosen] = [[], null, 0];
-    [pixel, probed] = [given.size.map((n) => n >> 1), given.other ? "b" : "a"];
+    [pixel, probed] = [null, given.other ? "b" : "a"];
     whole = {size: given.size, origin: given.origin ?? [0, 0]};
     change({...STATE_DEFAULTS, ...given}, false);
   }
