@@ -97,6 +97,46 @@ def test_values_come_from_a_file_or_by_name(tmp_path):
         assert np.array_equal(chunk_of(out / "field/c/0/0", whole.dtype, (h, w)), whole)
 
 
+@pytest.mark.filterwarnings("ignore::topleft.MeshWarning")
+def test_values_come_by_name_from_a_file_of_cells(tmp_path, capsys):
+    meshio = pytest.importorskip("meshio", reason="meshio is not installed")
+    points = np.array([(0, 0, 0), (4, 0, 0), (8, 0, 0), (0, 4, 1), (4, 4, 1), (8, 4, 1)], float)
+    cells = [("quad", [[0, 1, 4, 3]]), ("line", [[0, 5]]), ("triangle", [[1, 2, 4]])]
+    zones = [np.array([7]), np.array([5]), np.array([8])]
+    mesh = meshio.Mesh(points, cells, {"speed": np.array([0.0, 1, 4, 2, 3, 9])}, {"zone": zones})
+    mesh.write(tmp_path / "a.vtk")
+    mesh.write(tmp_path / "a.vtu")
+    grid = tl.Grid((8, 4), (0, 8, 0, 4))
+    for suffix in ("vtk", "vtu"):
+        for name in ("speed", "zone"):
+            whole, out = tl.field(mesh, name, grid, nodata=-1), tmp_path / f"{suffix}-{name}.zarr"
+            arguments = ["--pixel-size", "1", "--values", name, "--nodata", "-1", "--uncompressed", "--quiet"]
+            assert main(["raster", str(tmp_path / f"a.{suffix}"), "-o", str(out), *arguments]) == 0
+            assert np.array_equal(chunk_of(out / "field/c/0/0", whole.dtype, (4, 8)), whole)
+            assert len(np.unique(whole)) > 2
+    capsys.readouterr()
+    wrong = ["--pixel-size", "1", "--values", "x"]
+    assert main(["raster", str(tmp_path / "a.vtu"), "-o", str(tmp_path / "x.zarr"), *wrong]) == 2
+    assert "a name of data of the mesh (speed, zone), got 'x'" in capsys.readouterr().err
+
+
+def test_values_by_name_of_as_many_vertices_as_faces_are_told_apart(tmp_path):
+    data = "property float a\n", "property float b\n"
+    header = "ply\nformat binary_little_endian 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+    header += (
+        f"property float z\n{data[0]}element face 4\nproperty list uchar int vertex_indices\n{data[1]}end_header\n"
+    )
+    vertices = np.array([[0, 0, 0, 1], [4, 0, 0, 2], [4, 4, 0, 3], [0, 4, 0, 4]], "<f4")
+    faces = np.zeros(4, [("n", "u1"), ("v", "<i4", 3), ("b", "<f4")])
+    faces["n"], faces["b"] = 3, [5, 6, 7, 8]
+    faces["v"] = triangles = [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]
+    (tmp_path / "a.ply").write_bytes(header.encode() + vertices.tobytes() + faces.tobytes())
+    for name, per, values in (("a", "vertex", vertices[:, 3]), ("b", "triangle", faces["b"])):
+        raster = tl.tiles(tmp_path / "a.ply", tl.Grid((4, 4), (0, 4, 0, 4)), kind="field", values=name)
+        wished = tl.field((vertices[:, :2], triangles), values, tl.Grid((4, 4), (0, 4, 0, 4)), per=per)
+        assert np.array_equal(raster[:, :], wished)
+
+
 def test_crs_goes_to_zarr(tmp_path, pair):
     out = tmp_path / "a.zarr"
     assert main(["raster", pair, "-o", str(out), "--pixel-size", "1", "--crs", "EPSG:25832", "--quiet"]) == 0

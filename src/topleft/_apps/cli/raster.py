@@ -196,7 +196,7 @@ def add_raster_command(commands: Any) -> None:
     add("--extent", type=float, nargs=4, metavar=("X_MIN", "X_MAX", "Y_MIN", "Y_MAX"), help="the window to draw (all)")
     add("--crs", metavar="CRS", help="the CRS of x and y: EPSG:25832, say")
     add("--labels", action="store_true", help="write which triangle shows, -1 for none")
-    add("--values", metavar="FIELD", help="write values: a .npy file, or a name in a PLY file")
+    add("--values", metavar="FIELD", help="write values: a .npy file, or a name in a file of PLY, VTK, VTU or a solver")
     add("--kind", choices=DIRECT_KINDS, help="the content of pixels")
     add("--surface", choices=("upper", "lower"), help="the surface that gives heights (upper)")
     add("--subpixel-bits", type=subpixel_bits, default=8, metavar="N|exact", help=SUBPIXEL_BITS_HELP)

@@ -59,7 +59,8 @@ def tiles(
         "labels", their numbers; "coverage", a mask; "fill", the `values` of each.
     values : array_like or str, optional
         For "fill" the colours, of triangles or of vertices; for "field" the values, of vertices or faces. Also the name
-        of a .npy file, which is mapped, or of a property of the mesh's binary PLY file.
+        of a .npy file, which is mapped, of a property of the mesh's binary PLY file, or of data of points or cells of
+        a file that meshio reads.
     window : int or (width, height), pixels
         How large windows are; those of the last row and column may be smaller.
     extent, pixel_size, y

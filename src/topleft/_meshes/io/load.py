@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from topleft._core.base.defaults import DEFAULT_CREASE
 from topleft._core.base.notes import tell, tell_files
 from topleft._meshes.io.limits.budget import Budget, OverLimitError
 from topleft._meshes.io.references import InputFile, Moment
+from topleft._meshes.model.cells import Polygons
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.material import TEXTURES
 from topleft._meshes.model.mesh import Mesh
@@ -152,6 +153,19 @@ def load(
     tell_files(source.files())
     tell(source.notes.lines, stacklevel=2)
     return mesh if scale == 1 else scaled(mesh, scale)
+
+
+def load_cells(path: str | os.PathLike[str]) -> tuple[Any, Polygons]:
+    """The mesh of meshio of a file that it reads, and the triangles of its cells. Errors and warnings are of `load`."""
+    from topleft._meshes.io.solvers import read_cells
+
+    source = _input_file(path, None)
+    theirs, polygons = reading(source, lambda: read_cells(source, MESHIO_READERS[source.path.suffix.lower()]))
+    if polygons is None:
+        raise MeshError(f"{str(path)!r} has no triangles")
+    tell_files(source.files())
+    tell(source.notes.lines, stacklevel=2)
+    return theirs, polygons
 
 
 def clip_length(

@@ -17,21 +17,29 @@ import numpy as np
 
 from topleft._meshes.io.limits.budget import Budget
 from topleft._meshes.io.references import Cloud, InputFile
-from topleft._meshes.model.cells import of_cells
+from topleft._meshes.model.cells import Polygons, of_cells
 from topleft._meshes.model.mesh import Mesh
 from topleft.errors import MeshError, MissingPackageError
 
 
 def read_by_meshio(source: InputFile, readers: Sequence[str]) -> list[Mesh]:
     """The triangles of the cells of a file; cells that are not drawn are noted; modules of meshio are tried in turn."""
+    theirs, polygons = read_cells(source, readers)
+    if polygons is None:
+        points = np.asarray(theirs.points)
+        source.clouds.append(Cloud(np.pad(points, ((0, 0), (0, 3 - points.shape[1])))))
+        return []
+    return [Mesh(polygons.points_in_space, polygons.triangles)]
+
+
+def read_cells(source: InputFile, readers: Sequence[str]) -> tuple[Any, Polygons | None]:
+    """The mesh of meshio of a file, and the triangles of its cells; None of points alone."""
     source.content()  # which is counted
     theirs = _read(source, readers)
     kinds = list(dict.fromkeys(block.type for block in theirs.cells))
     source.budget.spend("max_vertices", len(theirs.points))
     if set(kinds) <= {"vertex"}:
-        points = np.asarray(theirs.points)
-        source.clouds.append(Cloud(np.pad(points, ((0, 0), (0, 3 - points.shape[1])))))
-        return []
+        return theirs, None
     try:
         polygons = of_cells(theirs)
     except ValueError as error:
@@ -39,7 +47,7 @@ def read_by_meshio(source: InputFile, readers: Sequence[str]) -> list[Mesh]:
     source.budget.spend("max_triangles", len(polygons.triangles))
     for kind in polygons.not_drawn:
         source.notes.add("cells not drawn", kind)
-    return [Mesh(polygons.points_in_space, polygons.triangles)]
+    return theirs, polygons
 
 
 def _read(source: InputFile, readers: Sequence[str]) -> Any:

@@ -14,8 +14,9 @@ import mmap
 import os
 import tempfile
 import weakref
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,11 +27,13 @@ from topleft._core.base.array_types import I32, Array
 from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, as_plane_points, shown
 from topleft._core.base.memory import FRESH, Memory
 from topleft._meshes.io.limits.npy import check_header
-from topleft._meshes.io.load import load
+from topleft._meshes.io.load import MESHIO_READERS, load, load_cells
 from topleft._meshes.io.ply import mapped_elements
 from topleft._meshes.io.stl_off import mapped_corners
+from topleft._meshes.model.cells import data_of
 from topleft._meshes.scene.adapt import as_polygons
 from topleft.errors import MeshError
+from topleft.typing import PerOption
 
 BLOCK = 1 << 17
 """Triangles that are read at a time: 3 MB of corners."""
@@ -60,6 +63,10 @@ class Triangles(Protocol):
         """All that the mesh consists of, in pieces, to be hashed."""
 
 
+DataByName = Callable[[str], tuple[Array, PerOption]]
+"""The values of a name, and which parts of the mesh they are of; a `ValueError` lists the names that there are."""
+
+
 @dataclass
 class IndexedTriangles:
     """Triangles of shared vertices, in memory or in mapped files."""
@@ -69,7 +76,7 @@ class IndexedTriangles:
     faces: Array | None = None
     n_faces: int = 0
     owner: object = None  # removes temporary files
-    named: dict[str, Array] = field(default_factory=dict)  # other values of vertices and faces in a file
+    data: DataByName | None = None  # of vertices or faces, in the file
 
     def __post_init__(self) -> None:
         first = self.columns[0]
@@ -115,7 +122,7 @@ class IndexedTriangles:
 
     def __getstate__(self) -> dict[str, Any]:
         state = {**vars(self), "columns": tuple(map(sent, self.columns)), "triangles": sent(self.triangles)}
-        return {**state, "owner": None, "named": {}}
+        return {**state, "owner": None, "data": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         columns = tuple(map(received, state["columns"]))
@@ -240,11 +247,26 @@ def triangles_of_file(path: Path) -> Triangles:
         if suffix == ".ply" and (found := mapped_elements(path)) is not None:
             of_vertices, triangles, of_faces = found
             columns = of_vertices["x"], of_vertices["y"], of_vertices["z"]
-            return IndexedTriangles(side_by_side(columns), triangles, named={**of_faces, **of_vertices})
+            return IndexedTriangles(side_by_side(columns), triangles, data=partial(property_of, of_vertices, of_faces))
     except MeshError as error:
         raise MeshError(f"cannot read {path}: {error}") from None
+    if suffix in MESHIO_READERS:
+        theirs, polygons = load_cells(path)
+        cells = of_arrays(polygons.points_in_space, polygons.triangles, polygons.faces, polygons.n_faces)
+        return replace(cells, data=partial(data_of, theirs))
     mesh: Any = load(path)
     return open_triangles(mesh, None)
+
+
+def property_of(of_vertices: Mapping[str, Array], of_faces: Mapping[str, Array], name: str) -> tuple[Array, PerOption]:
+    """The values of a property of a PLY file, and which of both they are of."""
+    if name in of_vertices:
+        return of_vertices[name], "vertex"
+    if name in of_faces:
+        return of_faces[name], "triangle"
+    there = [other for other, array in {**of_faces, **of_vertices}.items() if np.ndim(array) == 1]
+    known = ", ".join(there) or "none"
+    raise ValueError(f"values must be a .npy file or a property of the mesh's file ({known}), got {name!r}")
 
 
 def side_by_side(columns: tuple[Array, ...]) -> tuple[Array, ...]:

@@ -27,10 +27,18 @@ from topleft._meshes.field.field import grid_of
 from topleft._meshes.windows import areas, drawing
 from topleft._meshes.windows.ahead import in_order, kept_memory
 from topleft._meshes.windows.areas import AreaIndex, Areas, are_polygons, areas_of, extent_of_polygons
-from topleft._meshes.windows.blocks import BLOCK, Triangles, fingerprint_of, mapped_npy, open_triangles
+from topleft._meshes.windows.blocks import (
+    BLOCK,
+    DataByName,
+    Triangles,
+    fingerprint_of,
+    mapped_npy,
+    open_triangles,
+    property_of,
+)
 from topleft._meshes.windows.drawing import ON_GRIDS, Crop, Painter, Payload, painter_of, without_values
 from topleft._meshes.windows.spans import SPAN_BYTES, Tiling, WindowIndex
-from topleft.typing import RasterKindOption, YOption
+from topleft.typing import PerOption, RasterKindOption, YOption
 
 Path = str | os.PathLike[str]
 
@@ -145,7 +153,9 @@ class WindowedRaster:
         w, h = as_size(window, "window", smallest=1)
         self.window_size = min(w, max(self.size[0], 1)), min(h, max(self.size[1], 1))
         if isinstance(values, str | os.PathLike):
-            values = values_of(values, self.triangles)
+            values, per = values_of(values, self.triangles)
+            if per is not None and "per" in drawing.KINDS[kind].options:
+                options = {"per": per, **options}
         kinds = areas.KINDS if is_of_areas else drawing.KINDS
         if kind not in kinds:
             raise ValueError(f"kind must be 'labels', 'coverage' or 'fill' for polygons, got {kind!r}")
@@ -396,13 +406,10 @@ def extent_of(subject: Any) -> Extent:
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def values_of(name: str | os.PathLike[str], triangles: Any) -> Any:
-    """The values of a .npy file, or a property of this name of the vertices or faces of a mapped PLY file."""
+def values_of(name: str | os.PathLike[str], triangles: Any) -> tuple[Array, PerOption | None]:
+    """The values of a .npy file; or those that the file of the mesh has by a name, and the parts that they are of."""
     text = os.fspath(name)
     if text.endswith(".npy"):
-        return mapped_npy(pathlib.Path(text))
-    named = getattr(triangles, "named", {})
-    if text in named:
-        return named[text]
-    there = ", ".join(name for name, array in named.items() if np.ndim(array) == 1) or "none"
-    raise ValueError(f"values must be a .npy file or a property of the mesh's PLY file ({there}), got {text!r}")
+        return mapped_npy(pathlib.Path(text)), None
+    data: DataByName | None = getattr(triangles, "data", None)
+    return property_of({}, {}, text) if data is None else data(text)
