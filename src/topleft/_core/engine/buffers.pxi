@@ -257,6 +257,8 @@ cdef class Pieces:
             K.clip(&source.source, &projected, &triangles[0, 0], listed, n, &viewport.view, p)
         if p.n_pieces == 0:
             return
+        if p.n_vertices >= 1 << 31:
+            raise MemoryError(f"triangles cut by planes have {p.n_vertices:,} corners, and int32 counts 2,147,483,647")
         records = wide = points = None
         if is_snapped:
             records, wide = np.empty(p.n_vertices * VERTEX_BYTES, np.uint8), np.empty((p.n_vertices, 2), np.int64)
