@@ -155,3 +155,13 @@ def test_record_has_no_path_of_the_machine(tmp_path):
         tl.render_batch([job]).finish()
     assert os.fsencode(tmp_path) not in (tmp_path / "a.png").read_bytes()
     assert JobRunner().is_done(job)
+
+
+@pytest.mark.parametrize(
+    "record", ["[1, 2]", "[[", "[" * 5000, '["00", "\\ud800"]', "[]", '["a", 2]', "{}", '["00", "../../../etc/passwd"]']
+)
+def test_resume_draws_over_a_record_that_it_has_not_written(tmp_path, record):
+    path = tmp_path / "a.npy"
+    path.write_bytes(b"\x93NUMPY topleft:made " + record.encode())
+    assert skipped([tl.Job(**BASE, destination=str(path))]) == [False]
+    assert skipped([tl.Job(**BASE, destination=str(path))]) == [True]

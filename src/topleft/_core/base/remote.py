@@ -161,7 +161,8 @@ class RemotePath:
             raise ValueError(f"cannot write to {self.url}: {error}") from None
         except OSError as error:
             told = f"cannot write to {self.url}: {error.strerror or error}"
-            raise (OSError(told) if error.errno is None else OSError(error.errno, told)) from error
+            kind = type(error) if type(error).__module__ == "builtins" else OSError
+            raise (kind(told) if error.errno is None else kind(error.errno, told)) from error
 
     def _send(self, fs: Any, name: str, content: bytes) -> None:
         protocols = {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)

@@ -6,7 +6,6 @@ Input: an array, or several by name. Output: PNG, JPEG, WebP, TIFF, .npy or .npz
 from __future__ import annotations
 
 import io
-import json
 import os
 import re
 import struct
@@ -124,8 +123,12 @@ def write_image(
         raise ImageError(f"cannot write {str(place)!r}: text goes into .png only")
     if grid is not None and suffix not in (".tif", ".tiff"):
         raise ImageError(f"cannot write {str(place)!r}: a grid goes into .tif only")
-    listed = json.dumps(record) if record else ""
-    note = f"{RECORD} {listed}".encode() if 0 < len(listed) < MOST_OF_RECORD else b""
+    note = b""
+    if record:
+        import json  # which few programs need
+
+        listed = json.dumps(record)
+        note = f"{RECORD} {listed}".encode() if len(listed) < MOST_OF_RECORD else b""
     if suffix == ".npz":
         arrays: dict[str, Any] = dict(image) if isinstance(image, Mapping) else {"image": image}
         write_whole(place, lambda file: _write_npz(file, arrays, note))
@@ -177,6 +180,8 @@ def _write_npz(file: IO[bytes], arrays: dict[str, Any], note: bytes) -> None:
 
 def read_record(path: Location) -> tuple[str, ...]:
     """The record of a file of `write_image`; empty where there is no such file, or no record in it."""
+    import json
+
     try:
         if isinstance(path, RemotePath):
             ends = path.ends(ENDS_BYTES)
@@ -186,9 +191,10 @@ def read_record(path: Location) -> tuple[str, ...]:
                 file.seek(max(len(ends), file.seek(0, os.SEEK_END) - ENDS_BYTES))
                 ends += file.read()
         found = re.search(rf"{RECORD}[\0 ](\[.*)", ends.decode("latin-1"), re.DOTALL)
-        return () if found is None else tuple(json.JSONDecoder().raw_decode(found[1])[0])
-    except (OSError, ValueError):
+        record = () if found is None else tuple(json.JSONDecoder().raw_decode(found[1])[0])
+    except (OSError, ValueError, RecursionError):
         return ()
+    return record if all(isinstance(word, str) for word in record) else ()
 
 
 def _geo_tags(grid: Grid, picture: npt.NDArray[Any]) -> Tags:
