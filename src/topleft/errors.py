@@ -62,7 +62,7 @@ class MissingPackageError(TopleftError, ImportError):
 
 
 class MeshWarning(UserWarning):
-    """A part of a mesh file is not read, or a file that it names is missing: the picture will be without it.
+    """A part of a mesh file is not read, a file that it names is missing, or planes cut: the picture will lack it.
 
     Examples
     --------

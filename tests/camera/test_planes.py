@@ -1,5 +1,8 @@
 """Cameras without planes: pictures cut nothing in front of the eye, and float32 orders depths at every distance."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,7 +107,8 @@ def test_given_planes_cut_and_measure_depth(planes):
         [(-9, -9, 20), (9, -9, 20), (0, 9, 20), (-0.1, -0.1, 0.1), (0.1, -0.1, 0.1), (0, 0.1, 0.1)],
         [(0, 1, 2), (3, 4, 5)],
     )
-    ids = set(np.unique(tl.rasterize_mesh(mesh, camera, SIZE).triangle))
+    with pytest.warns(tl.MeshWarning, match="cuts? what lies in front of the eye"):
+        ids = set(np.unique(tl.rasterize_mesh(mesh, camera, SIZE).triangle))
     assert (0 in ids) == ("far" not in planes)
     assert (1 in ids) == ("near" not in planes)
 
@@ -183,3 +187,85 @@ def test_depth_without_planes_is_written_from_the_least_to_the_greatest(tmp_path
     layers = tl.render_layers(tl.Scene([square(4.0, 0.5), square(8.0, 4.0)]), camera, SIZE, layers="depth")
     layers.save(tmp_path / "depth.png")
     assert (tmp_path / "depth.png").stat().st_size > 0
+
+
+def told_by(draw, count=1):
+    """The lines of warnings of some draws that are alike."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(count):
+            draw()
+    assert all(one.category is tl.MeshWarning and one.filename == __file__ for one in caught)
+    return [str(one.message) for one in caught]
+
+
+VERBS = [tl.render, tl.rasterize_mesh, tl.silhouette, tl.render_layers, tl.object_masks, tl.visible_layers]
+
+
+@pytest.mark.parametrize("draw", VERBS, ids=lambda draw: draw.__name__)
+@pytest.mark.parametrize("ortho_height", [None, 30], ids=["perspective", "ortho"])
+def test_planes_that_cut_are_told_once(draw, ortho_height):
+    scene = tl.Scene([square(-10), square(-20), square(-30)])  # the camera looks along -z
+    planes = {"near=12": (12, 40), "far=25": (5, 25), "near=15 and far=25": (15, 25), "": (10, 30)}
+    for fact, (near, far) in planes.items():
+        camera = tl.Camera.look_at((0, 0, 0), (0, 0, -1), ortho_height=ortho_height, near=near, far=far)
+        lines = told_by(lambda camera=camera: draw(scene, camera, SIZE), count=2)
+        assert len(lines) == bool(fact)
+        assert all(f"; {fact} cut" in line for line in lines)
+
+
+def test_planes_tell_nothing_of_what_the_picture_lacks_anyway():
+    ground = tl.Mesh([(-1, -1, 0), (1, -1, 0), (0, -1, -0.01)], [(0, 1, 2)])  # beneath the eye
+    aside = tl.Mesh(np.array([(90, 0, -30), (91, 0, -30), (90, 1, -30)]), [(0, 1, 2)])
+    unused = tl.Mesh([*square(-10).vertices, (0, 0, -99)], square(-10).triangles)
+    camera = tl.Camera.look_at((0, 0, 0), (0, 0, -1), near=5, far=20)
+    for mesh in (ground, aside, unused, square(5)):  # the last lies behind the eye
+        assert told_by(lambda mesh=mesh: tl.render(mesh, camera, SIZE)) == []
+    open_ended = {"near_clip": False, "far_clip": False}
+    assert told_by(lambda: tl.rasterize_mesh(square(-30), camera, SIZE, **open_ended)) == []
+    assert told_by(lambda: tl.render(square(-30), size=SIZE)) == []
+    assert told_by(lambda: tl.render(square(-30), tl.Camera.look_at((0, 0, 0), (0, 0, -1)), SIZE)) == []
+    assert told_by(lambda: tl.render(square(-30), tl.Camera.framing(square(-30)), SIZE)) == []
+
+
+def test_a_part_of_a_large_mesh_and_the_picture_of_a_lens_are_looked_at():
+    ball = tl.Mesh(*tl.scenes.icosphere(5))
+    camera = tl.Camera.look_at((0, 0, 5), near=4.1, far=20)
+    assert len(ball.triangles) > 2048
+    assert len(told_by(lambda: tl.render(ball, camera, SIZE))) == 1
+    lens = replace(camera, lens=tl.OpenCVLens(k1=-0.1))
+    assert len(told_by(lambda: tl.render(ball, lens, SIZE))) == 1
+
+
+def test_planes_that_leave_float32_no_room_are_told():
+    def told(near, size):
+        camera = tl.Camera.look_at((0, 0, 500), near=near, far=1000)
+        return told_by(lambda: tl.render(square(0, size), camera, SIZE))
+
+    (line,) = told(0.001, 100)
+    assert line == (
+        "camera should have far / near of at most 100000 here, or no planes: between near=0.001 and far=1000 float32 "
+        "has fewer than 1000 steps of depth in the size of a mesh"
+    )
+    assert told(1.0, 100) == []
+    assert told(0.005, 150000) == []
+
+
+def test_a_batch_tells_of_planes_once():
+    jobs = [
+        tl.Job(square(-30), camera=tl.Camera.look_at((0, 0, i), (0, 0, -9), near=1, far=20), size=SIZE)
+        for i in range(3)
+    ]
+    assert len(told_by(lambda: list(tl.render_batch(jobs)))) == 1
+
+
+@pytest.mark.parametrize("planes", [(0.1, 20.0), (1e-3, np.inf), (-3.0, 4.0)], ids=["both", "infinite", "ortho"])
+def test_planes_of_a_projection(planes):
+    near, far = planes
+    made = {"near": near, "far": 1e9 if np.isinf(far) else far, "ortho_height": 2.0 if near < 0 else None}
+    camera = tl.Camera.look_at((0, 0, 5), **made)
+    if np.isinf(far):
+        matrix = camera.projection.copy()
+        matrix[2, 2:] = -1, -2 * near
+        camera = tl.Camera(camera.view, matrix)
+    assert np.allclose(camera.planes, planes)

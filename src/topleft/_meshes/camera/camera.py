@@ -80,7 +80,8 @@ class Camera:
     lens : OpenCVLens or FisheyeLens, optional
         Bends the rays before `projection`, which must have perspective, sees them; without one they are straight.
     has_planes : bool
-        Whether the near and far planes of `projection` cut what is drawn. False for a camera that is made without
+        Whether the near and far planes of `projection` cut what is drawn; `MeshWarning` tells if they cut what a
+        picture shows in front of the eye. False for a camera that is made without
         `near=` and `far=`: pictures show all that lies in front of the eye, and depth is measured without planes, as
         -1 / distance along the view, or without perspective as that distance. Only `clip_from_world` and
         `clip_from_eye` have planes then.
@@ -220,6 +221,16 @@ class Camera:
         ndc = as_real("depth", depth)
         ndc = 2.0 * ndc - 1 if self.has_planes else ndc
         return (ndc * d - b) / (ndc * c - a)
+
+    @cached_property
+    def planes(self) -> tuple[float, float]:
+        """The distances along the view of the planes of `projection`, ascending."""
+        (a, b), (c, d) = self.projection[2:, 2:].tolist()
+        first, last = (
+            float("inf") if not divisor or (c and above / divisor < 0) else above / divisor
+            for above, divisor in ((-d - b, -c - a), (d - b, c - a))
+        )
+        return min(first, last), max(first, last)
 
     def straightened(self) -> Camera:
         """The camera without its lens."""

@@ -6,7 +6,7 @@ Input: `Scene`, `Camera`. Output: `ObjectMasks`: masks, run lengths, boxes, visi
 from __future__ import annotations
 
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, cast
 
 import numpy as np
@@ -275,7 +275,7 @@ def object_masks(
         raise ValueError(f"beyond must reach at most {MOST_BEYOND_PX} pixels, got {beyond} pictures of {shot.size}")
     whole, (width, height) = shot.scene, shot.size
     options: dict[str, Any] = {"cull": cull, "subpixel_bits": subpixel_bits, "threads": threads}
-    placed = Placed.parse(Shot(whole, shot.camera, shot.size), options)
+    placed = Placed.parse(replace(shot, is_mesh=False), options)
     instance, boxes = seen_in(placed)
     n_visible = np.bincount(instance.reshape(-1) + 1, minlength=len(whole) + 1)[1:].astype(np.int64)
     more_x, more_y = (int(np.ceil(beyond * side)) for side in shot.size)

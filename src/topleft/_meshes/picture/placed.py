@@ -31,6 +31,7 @@ from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import trusted_mesh
 from topleft._meshes.picture.bend import BentMesh, bend
 from topleft._meshes.picture.fragments import Ids, MeshFragments, SceneFragments
+from topleft._meshes.picture.planes import tell_of_planes
 from topleft._meshes.picture.shot import Shot
 from topleft._meshes.scene.scene import Instance, Scene
 
@@ -111,6 +112,8 @@ class Placed:
     ) -> Placed:  # fmt: skip
         """Place a shot; `mesh_view`: the view of a mesh alone with the sides that it shows, if these are known."""
         camera, whole = shot.camera, shot.scene
+        if shot.may_cut and view.near_clip and view.far_clip:
+            tell_of_planes(shot)
         if camera.lens is not None:
             scene, bent = bend_scene(whole, camera, camera.lens, view.viewport, near_clip=view.near_clip)
             matrix = camera.drawn_from_eye(view.viewport)

@@ -31,6 +31,8 @@ class Shot:
     camera: Camera
     size: tuple[int, int]
     is_mesh: bool = False
+    may_cut: bool = False
+    """Whether the planes of the camera may cut the scene, of which a picture tells."""
 
     @classmethod
     def of(cls, given: MeshLike | Scene | Points, camera: CameraLike | None, size: object) -> Shot | CloudShot:
@@ -40,14 +42,14 @@ class Shot:
         if isinstance(subject, Points):
             return CloudShot(subject, seen_by, checked)
         scene = scene_of(subject)
-        return cls(scene, seen_by, checked, is_mesh=scene is not subject)
+        return cls(scene, seen_by, checked, scene is not subject, camera is not None and seen_by.has_planes)
 
     @classmethod
     def of_meshes(cls, given: MeshLike | Scene, camera: CameraLike | None, size: object) -> Shot:
         """Return a shot of a mesh or a scene, as `of` does; points are refused."""
         checked, subject = as_size(size), as_meshes(given)
-        scene = scene_of(subject)
-        return cls(scene, camera_for(subject, camera, checked), checked, is_mesh=scene is not subject)
+        scene, seen_by = scene_of(subject), camera_for(subject, camera, checked)
+        return cls(scene, seen_by, checked, scene is not subject, camera is not None and seen_by.has_planes)
 
     def memory(self, rasterizer: Rasterizer | None) -> AbstractContextManager[Memory]:
         """Return the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.

@@ -12,6 +12,7 @@ from dataclasses import InitVar, dataclass, field
 from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -324,6 +325,11 @@ class Scene:
         for k, (_, at) in enumerate(self.meshes.values()):
             of_instance[at] = k
         return [mesh for mesh, _ in self.meshes.values()], of_instance
+
+    @cached_property
+    def seen_by(self) -> WeakSet[object]:
+        """The cameras with planes that pictures had."""
+        return WeakSet()
 
     @cached_property
     def cache(self) -> SceneCache:
