@@ -46,11 +46,11 @@ def test_mesh_on_its_way_to_the_pixel_passes_no_more_than_it_did():
 def test_scene_of_one_takes_the_way_of_its_mesh():
     ball = tl.Mesh(*tl.scenes.icosphere(2))
     camera, size = tl.Camera.framing(ball), (64, 64)
-    tl.rasterize_mesh(ball, camera, size, threads=1)  # what is kept of the options is made
-    of_mesh, of_scene = (
-        passed(lambda subject=subject: tl.rasterize_mesh(subject, camera, size, threads=1))[0]
-        for subject in (ball, tl.Scene([ball]))
-    )
+    found = []
+    for subject in (ball, tl.Scene([ball])):
+        tl.rasterize_mesh(subject, camera, size, threads=1)  # what is kept is made
+        found.append(passed(lambda subject=subject: tl.rasterize_mesh(subject, camera, size, threads=1))[0])
+    of_mesh, of_scene = found
     assert of_scene - of_mesh == {"_meshes/picture/fragments.py"}  # `SceneFragments`
     assert of_mesh <= of_scene
 

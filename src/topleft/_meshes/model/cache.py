@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from typing import TYPE_CHECKING, TypeVar
+from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -63,3 +64,5 @@ class MeshCache:
         """The materials with holes and their triangles."""
         self.blended: ByMaterial[npt.NDArray[np.bool_] | None] = ByMaterial()
         """Which triangles blend with what lies behind them."""
+        self.checked_cameras: WeakSet[object] = WeakSet()
+        """Cameras whose planes were compared with the mesh."""

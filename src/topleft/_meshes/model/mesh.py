@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
-from weakref import WeakSet
 
 import numpy as np
 import numpy.typing as npt
@@ -259,11 +258,6 @@ class Mesh:
         if clusters is None:
             return True
         return not clusters.backoff.is_over()
-
-    @cached_property
-    def seen_by(self) -> WeakSet[object]:
-        """The cameras with planes that pictures had."""
-        return WeakSet()
 
     @cached_property
     def cache(self) -> MeshCache:

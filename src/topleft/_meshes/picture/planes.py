@@ -44,9 +44,7 @@ STEPS_PER_MESH = 1000
 def tell_of_planes(shot: Shot) -> None:
     """Tell of the planes of a shot's camera, at its first picture of this subject."""
     subject, camera = shot.subject, shot.camera
-    if camera in subject.seen_by:
-        return
-    subject.seen_by.add(camera)
+    subject.cache.checked_cameras.add(camera)
     with np.errstate(all="ignore"):
         lines = list(faults_of(shot.scene, camera, shot.size))
     if lines:

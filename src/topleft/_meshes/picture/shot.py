@@ -32,7 +32,7 @@ class Shot:
     size: tuple[int, int]
     is_mesh: bool = False
     may_cut: bool = False
-    """Whether the planes of the camera may cut the scene, of which a picture tells."""
+    """Whether the camera has planes that no picture has compared with the subject yet."""
 
     @classmethod
     def of(cls, given: MeshLike | Scene | Points, camera: CameraLike | None, size: object) -> Shot | CloudShot:
@@ -41,15 +41,17 @@ class Shot:
         seen_by = camera_for(subject, camera, checked)
         if isinstance(subject, Points):
             return CloudShot(subject, seen_by, checked)
+        is_new = camera is not None and seen_by.has_planes and seen_by not in subject.cache.checked_cameras
         scene = scene_of(subject)
-        return cls(scene, seen_by, checked, scene is not subject, camera is not None and seen_by.has_planes)
+        return cls(scene, seen_by, checked, scene is not subject, is_new)
 
     @classmethod
     def of_meshes(cls, given: MeshLike | Scene, camera: CameraLike | None, size: object) -> Shot:
         """Return a shot of a mesh or a scene, as `of` does; points are refused."""
         checked, subject = as_size(size), as_meshes(given)
         scene, seen_by = scene_of(subject), camera_for(subject, camera, checked)
-        return cls(scene, seen_by, checked, scene is not subject, camera is not None and seen_by.has_planes)
+        is_new = camera is not None and seen_by.has_planes and seen_by not in subject.cache.checked_cameras
+        return cls(scene, seen_by, checked, scene is not subject, is_new)
 
     def memory(self, rasterizer: Rasterizer | None) -> AbstractContextManager[Memory]:
         """Return the memory of a `Rasterizer` of a mesh's size, which draws nothing else meanwhile, or fresh memory.

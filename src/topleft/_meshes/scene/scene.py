@@ -155,6 +155,8 @@ class SceneCache:
         """The materials with holes of each instance."""
         self.blended: ByMaterial[list[npt.NDArray[np.bool_] | None]] = ByMaterial()
         """The blended triangles of each instance."""
+        self.checked_cameras: WeakSet[object] = WeakSet()
+        """Cameras whose planes were compared with the scene."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -325,11 +327,6 @@ class Scene:
         for k, (_, at) in enumerate(self.meshes.values()):
             of_instance[at] = k
         return [mesh for mesh, _ in self.meshes.values()], of_instance
-
-    @cached_property
-    def seen_by(self) -> WeakSet[object]:
-        """The cameras with planes that pictures had."""
-        return WeakSet()
 
     @cached_property
     def cache(self) -> SceneCache:
