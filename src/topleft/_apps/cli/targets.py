@@ -144,7 +144,7 @@ MOMENTS_TO_FRAME = 5
 
 @dataclass(frozen=True)
 class ClipOrbit:
-    """The camera of all frames of a clip; `meshes` are those of some moments, all of which it shows."""
+    """The camera of all frames of a clip; it shows `meshes`, the mesh at some moments of the clip."""
 
     orbit: Orbit
     meshes: tuple[MeshSource, ...]

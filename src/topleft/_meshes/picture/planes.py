@@ -26,7 +26,7 @@ MOST_TRIANGLES = 2048
 """Triangles of a mesh that are looked at: all, or as many that are spread over a larger one."""
 
 MOST_INSTANCES = 16
-"""Instances that are looked at, of those whose boxes reach beyond a plane."""
+"""The most instances that are looked at, among instances whose boxes reach beyond a plane."""
 
 SPREAD = 2654435761
 """A prime: its multiples, modulo the number of triangles, are spread over all of them."""
