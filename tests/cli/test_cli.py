@@ -247,6 +247,7 @@ def test_render_files_of_one_name_have_numbers_or_folders(run, folder, out, pict
         (".step", "reading 'x.step' needs another package: pip install cascadio"),
         (".fbx", "cannot read 'x.fbx': there is no reader of .fbx; Blender and assimp convert it: assimp export x.fbx"),
         (".usdz", "cannot read 'x.usdz': there is no reader of .usdz; Blender converts it"),
+        (".pvd", "cannot read 'x.pvd': there is no reader of .pvd; it names a file for each time step"),
         (".3ds", "cannot read 'x.3ds': there is no reader of .3ds; Blender and assimp convert it"),
     ],
 )

@@ -97,27 +97,41 @@ def test_values_come_from_a_file_or_by_name(tmp_path):
         assert np.array_equal(chunk_of(out / "field/c/0/0", whole.dtype, (h, w)), whole)
 
 
+def test_values_of_time_steps_that_meshio_loses_are_told(tmp_path, capsys):
+    pytest.importorskip("meshio", reason="meshio is not installed")
+    nodes = "$Nodes\n3\n1 0 0 0\n2 4 0 0\n3 0 4 0\n$EndNodes\n$Elements\n1\n1 2 2 0 0 1 2 3\n$EndElements\n"
+    steps = [f'$NodeData\n1\n"u"\n1\n{t}.0\n3\n{t}\n1\n3\n1 {t}\n2 {t}\n3 {t}\n$EndNodeData\n' for t in (0, 1)]
+    for n in (1, 2):
+        path = tmp_path / f"{n}.msh"
+        path.write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n" + nodes + "".join(steps[:n]))
+        assert main(["raster", str(path), "-o", str(path) + ".zarr", "--size", "4x4", "--values", "u", "--quiet"]) == 0
+        told = "views of which the last step alone is read: 'u'" in capsys.readouterr().err
+        assert told == (n == 2)
+
+
 @pytest.mark.filterwarnings("ignore::topleft.MeshWarning")
 def test_values_come_by_name_from_a_file_of_cells(tmp_path, capsys):
     meshio = pytest.importorskip("meshio", reason="meshio is not installed")
     points = np.array([(0, 0, 0), (4, 0, 0), (8, 0, 0), (0, 4, 1), (4, 4, 1), (8, 4, 1)], float)
     cells = [("quad", [[0, 1, 4, 3]]), ("line", [[0, 5]]), ("triangle", [[1, 2, 4]])]
     zones = [np.array([7]), np.array([5]), np.array([8])]
-    mesh = meshio.Mesh(points, cells, {"speed": np.array([0.0, 1, 4, 2, 3, 9])}, {"zone": zones})
+    of_points = {"speed": np.array([0.0, 1, 4, 2, 3, 9]), "flow": points[::-1].copy()}
+    mesh = meshio.Mesh(points, cells, of_points, {"zone": zones})
     mesh.write(tmp_path / "a.vtk")
     mesh.write(tmp_path / "a.vtu")
     grid = tl.Grid((8, 4), (0, 8, 0, 4))
     for suffix in ("vtk", "vtu"):
-        for name in ("speed", "zone"):
+        for name in ("speed", "zone", "flow"):
             whole, out = tl.field(mesh, name, grid, nodata=-1), tmp_path / f"{suffix}-{name}.zarr"
             arguments = ["--pixel-size", "1", "--values", name, "--nodata", "-1", "--uncompressed", "--quiet"]
             assert main(["raster", str(tmp_path / f"a.{suffix}"), "-o", str(out), *arguments]) == 0
-            assert np.array_equal(chunk_of(out / "field/c/0/0", whole.dtype, (4, 8)), whole)
+            chunk = "field/c/0/0" + "/0" * (whole.ndim - 2)
+            assert np.array_equal(chunk_of(out / chunk, whole.dtype, whole.shape), whole)
             assert len(np.unique(whole)) > 2
     capsys.readouterr()
     wrong = ["--pixel-size", "1", "--values", "x"]
     assert main(["raster", str(tmp_path / "a.vtu"), "-o", str(tmp_path / "x.zarr"), *wrong]) == 2
-    assert "a name of data of the mesh (speed, zone), got 'x'" in capsys.readouterr().err
+    assert "a name of data of the mesh (speed, flow, zone), got 'x'" in capsys.readouterr().err
 
 
 def test_values_by_name_of_as_many_vertices_as_faces_are_told_apart(tmp_path):

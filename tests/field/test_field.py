@@ -251,12 +251,12 @@ def test_grid_centers_go_with_the_rows():
     ("call", "message"),
     [
         (lambda: tl.field((SQUARE, HALVES), [1, 2, 3], (4, 3)),
-         r"shape \(4,\) per vertex or \(2,\) per face, got \(3,\)"),
+         r"shape \(4,\) or \(4, C\) per vertex or \(2,\) or \(2, C\) per face, got \(3,\)"),
         (lambda: tl.field((SQUARE, HALVES), [1, 2], (4, 3), per="vertex"),
-         r"values must have shape \(4,\), got \(2,\)"),
+         r"values must have shape \(4,\) or \(4, C\), got \(2,\)"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), per="triangle"),
-         r"values must have shape \(2,\), got \(4,\)"),
-        (lambda: tl.field((SQUARE, HALVES * 2), [1] * 4, (4, 3)), "values has 4 numbers, and there are as many faces"),
+         r"values must have shape \(2,\) or \(2, C\), got \(4,\)"),
+        (lambda: tl.field((SQUARE, HALVES * 2), [1] * 4, (4, 3)), "values has 4 rows, and there are as many faces"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, (4, 3), pixel_size=1), "a grid needs either size or pixel_size"),
         (lambda: tl.field((SQUARE, HALVES), [1] * 4, pixel_size=0), "pixel_size must be positive, got 0"),
@@ -360,3 +360,32 @@ def test_field_takes_data_of_a_mesh_by_name():
     solid = Cells([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [("tetra", [[0, 1, 2, 3]])], {}, {"zone": [[1]]})
     with pytest.raises(ValueError, match="values 'zone' are of solid cells, and their skin is drawn"):
         tl.field(solid, "zone", grid)
+
+
+@pytest.mark.parametrize("n_values", [4, 2])  # of vertices, of faces
+@pytest.mark.parametrize("dtype", [np.float32, np.int32])
+def test_field_of_vectors_has_a_channel_for_each_column(n_values, dtype):
+    values = np.random.default_rng(5).integers(0, 99, (n_values, 3)).astype(dtype)
+    grid = tl.Grid((9, 7), (-1, 5, -1, 4), nodata=-7)
+    found = tl.field((SQUARE, HALVES), values, grid)
+    columns = [tl.field((SQUARE, HALVES), column, grid) for column in values.T]
+    assert found.dtype == columns[0].dtype
+    assert np.array_equal(found, np.stack(columns, axis=-1))
+    out = np.empty((7, 9, 6), found.dtype)[..., ::2]
+    assert tl.field((SQUARE, HALVES), values, grid, out=out) is out
+    assert np.array_equal(out, found)
+
+
+def test_field_of_vectors_outside_is_nan_in_each_channel():
+    found = tl.field((SQUARE, [[0, 1, 2]]), np.ones((4, 2)), (6, 5), extent=(-1, 5, -1, 4))
+    assert found.shape == (5, 6, 2)
+    assert np.array_equal(np.isnan(found[..., 0]), np.isnan(found[..., 1]))
+    assert np.isnan(found).any()
+    assert np.nanmax(found) == 1
+
+
+def test_field_of_vectors_with_as_many_faces_as_vertices_asks_which():
+    with pytest.raises(ValueError, match="values has 4 rows, and there are as many faces as vertices"):
+        tl.field((SQUARE, HALVES * 2), np.ones((4, 3)), (4, 3))
+    with pytest.raises(ValueError, match=r"values must have shape \(4,\) or \(4, C\) per vertex or \(2,\) or \(2, C\)"):
+        tl.field((SQUARE, HALVES), np.ones((4, 3, 3)), (4, 3))

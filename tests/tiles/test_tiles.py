@@ -73,6 +73,8 @@ KINDS = {
     "fill exact": {"values": COLORS, "subpixel_bits": "exact"},
     "field": {"values": OF_VERTICES},
     "field of faces": {"values": np.arange(50, dtype=np.int16), "nodata": -1},
+    "field of vectors": {"values": IN_PIXELS[:, :2].astype(np.float32)},
+    "field of vectors of faces": {"values": np.arange(150, dtype=np.int16).reshape(50, 3), "nodata": -1},
     "height_map": {},
     "height_map lower": {"surface": "lower"},
 }

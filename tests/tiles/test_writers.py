@@ -41,6 +41,7 @@ KINDS = {
     "colors": {"kind": "fill", "values": RNG.integers(0, 256, (60, 3)).astype(np.uint8)},
     "alpha": {"kind": "fill", "values": RNG.integers(0, 256, (60, 4)).astype(np.uint8)},
     "field": {"kind": "field", "values": RNG.normal(size=200).astype(np.float32), "nodata": -9999.0},
+    "vectors": {"kind": "field", "values": RNG.normal(size=(200, 2))},
     "height_map": {"kind": "height_map"},
     "int16": {"kind": "field", "values": np.arange(60, dtype=np.int16), "nodata": -1},
 }
@@ -203,6 +204,7 @@ def test_geotiff_is_the_raster(tmp_path, kind, compression):
         assert found.crs.to_epsg() == 25832
         assert tl.Grid.from_transform(found.transform, (found.width, found.height)) == GRID
         assert found.overviews(1) == [2, 4, 8, 16]
+        assert ("alpha" in [band.name for band in found.colorinterp]) == (kind == "alpha")
         nodata = raster.painter.nodata
         assert (found.nodata is None) == (nodata is None)
         assert nodata is None or equal(np.float64(found.nodata), np.float64(nodata))
@@ -565,7 +567,10 @@ def test_geotiff_of_another_nodata_or_crs_is_another_one(tmp_path):
         raster_of("labels").to_geotiff(tmp_path / "a.tif", tile=16, nodata=-7, resume=True)
 
 
-NODATA = {"labels": -9999, "depth": -9999, "shares": -1, "field": 5e20, "height_map": -9999, "int16": 321, "rows": 9}
+NODATA = {
+    "labels": -9999, "depth": -9999, "shares": -1, "field": 5e20, "height_map": -9999, "int16": 321, "rows": 9,
+    "vectors": -7,
+}  # fmt: skip
 KINDS_OF_NUMBERS = {**KINDS, "rows": {"kind": "fill", "values": np.arange(60) % 3, "dtype": np.int32}}
 
 
@@ -581,12 +586,13 @@ def test_outside_is_the_no_data_of_the_file_in_each_writer(tmp_path, kind):
     is_outside = ~tl.tiles(CORNER, GRID, window=64, kind="coverage")[:]
     if kind == "shares":
         is_outside = raster[:] == 0
+    is_outside = is_outside.reshape(is_outside.shape + (1,) * (len(raster.shape) - 2))
     wished = np.where(is_outside, np.asarray(nodata, raster.dtype), raster[:])
     assert is_outside.any()
     raster.to_geotiff(tmp_path / "a.tif", tile=16, nodata=nodata)
     with rasterio.open(tmp_path / "a.tif") as found:
         assert found.nodata == np.asarray(nodata, raster.dtype)
-        assert equal(found.read(1), wished)
+        assert equal(np.moveaxis(found.read(), 0, -1), wished.reshape(200, 300, -1))
     changed = raster.with_nodata(nodata)
     changed.to_zarr(tmp_path / "a.zarr")
     found = zarr.open_array(tmp_path / "a.zarr" / raster.kind, mode="r")

@@ -125,7 +125,7 @@ def painting(raster: WindowedRaster) -> Callable[[Array], U8]:
         return lambda share: np.rint(share * np.float32(255)).astype(np.uint8)
     if raster.kind == "overdraw":
         return lambda counts: np.rint(np.minimum(counts, 255)).astype(np.uint8)
-    if raster.kind in ("depth", "field", "height_map"):
+    if raster.kind in ("depth", "field", "height_map") and not raster.painter.channels:
         low, high = raster.range_of_values
         return partial(greys, empty=raster.painter.empty, low=low, high=high)
     if raster.dtype == np.uint8 and raster.shape[2:] in ((), (2,), (3,), (4,)):

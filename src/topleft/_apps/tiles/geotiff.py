@@ -243,7 +243,7 @@ def tags_of(
         339: ("H", [kind] * n),
     }
     if extra:
-        tags[338] = ("H", [2 if extra == 1 else 0] * extra)
+        tags[338] = ("H", [2 if extra == 1 and store.dtype == np.uint8 else 0] * extra)
     if level == 0:
         tags |= more
     if nodata is not None:

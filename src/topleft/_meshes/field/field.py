@@ -1,6 +1,6 @@
 """Fields: values on an unstructured mesh, and heights of its surface, on a regular grid.
 
-Input: a mesh, values of its vertices or faces, a `Grid`. Output: an array (H, W), NaN where nothing is.
+Input: a mesh, values of its vertices or faces, a `Grid`. Output: an array (H, W) or (H, W, C), NaN where nothing is.
 
 Based on: Gold, C. M., T. D. Charters and J. Ramsden, "Automated Contour Mapping Using Triangular Element Data
 Structures and an Interpolant over Each Irregular Triangular Domain", SIGGRAPH 1977 (the plane through each triangle).
@@ -61,15 +61,16 @@ def field(
     threads: int | None = None,
     out: npt.NDArray[Any] | None = None,
 ) -> npt.NDArray[Any]:
-    """Return a field of an unstructured mesh on a regular grid, one value a pixel.
+    """Return a field of an unstructured mesh on a regular grid, a value or a vector a pixel.
 
     Parameters
     ----------
     mesh : matplotlib.tri.Triangulation, meshio.Mesh, pyvista.PolyData, (points, triangles), ...
         Whatever `as_mesh` takes; z is not looked at. Where triangles overlap, the later one is seen.
-    values : array_like of real numbers, shape (V,) per vertex or (F,) per face, or str
+    values : array_like of real numbers, shape (V,) or (V, C) per vertex, (F,) or (F, C) per face, or str
         Faces are the triangles, or the polygons or quadratic cells that they were cut from. A NaN makes its triangles
-        NaN. A name is that of data of points or cells of a mesh of meshio or pyvista.
+        NaN. C columns (components of a vector, time steps) share one drawing of the mesh. A name is that of data of
+        points or cells of a mesh of meshio or pyvista.
     size : (width, height) or Grid, optional
         How many pixels; or the grid, which then says all.
     origin : (column, row), pixels
@@ -89,20 +90,20 @@ def field(
         Whether values are of vertices or of triangles; "auto" tells by their number.
     subpixel_bits, threads
         As in `coverage`.
-    out : ndarray of the dtype of the result, shape (H, W), optional
+    out : ndarray of the dtype and shape of the result, optional
         Where the result goes. A fresh array costs its first touch.
 
     Returns
     -------
-    ndarray of float32, or float64 unless `values` are float32, shape (H, W)
+    ndarray of float32, or float64 unless `values` are float32, shape (H, W), or (H, W, C) of C columns
         Linear over each triangle, or constant; NaN, or `nodata`, outside of the mesh. Of integers of faces and with
         `nodata` in the dtype of `values`.
 
     Raises
     ------
     ValueError
-        If the number of values fits neither, or both; if a point in use is not finite; if `nodata` is no number of the
-        result's dtype; or as `Grid.around`.
+        If the rows of `values` fit neither in number, or both; if a point in use is not finite; if `nodata` is no
+        number of the result's dtype; or as `Grid.around`.
     TypeError
         If the values are no real numbers, or the mesh is none.
 
@@ -247,17 +248,17 @@ def grid_of(size: Any, pixel_size: Any, extent: ExtentLike | None, y: YOption, b
 
 def is_per_face(values: npt.NDArray[Any], n_vertices: int, n_faces: int, per: PerOption) -> bool:
     """Whether values are of faces; of vertices otherwise."""
-    fits_vertices, fits_faces = values.shape == (n_vertices,), values.shape == (n_faces,)
-    if per == "auto" and fits_vertices and fits_faces:
+    n_rows = values.shape[0] if values.ndim in (1, 2) else -1
+    if per == "auto" and n_rows == n_vertices == n_faces:
         raise ValueError(
-            f"values has {n_faces} numbers, and there are as many faces as vertices: say per='triangle' or per='vertex'"
+            f"values has {n_rows} rows, and there are as many faces as vertices: say per='triangle' or per='vertex'"
         )
-    if fits_faces and per != "vertex":
+    if n_rows == n_faces and per != "vertex":
         return True
-    if fits_vertices and per != "triangle":
+    if n_rows == n_vertices and per != "triangle":
         return False
-    wishes = {"vertex": f"({n_vertices},)", "triangle": f"({n_faces},)"}
-    wish = wishes.get(per, f"({n_vertices},) per vertex or ({n_faces},) per face")
+    wishes = {part: f"({n},) or ({n}, C)" for part, n in (("vertex", n_vertices), ("triangle", n_faces))}
+    wish = wishes.get(per, f"{wishes['vertex']} per vertex or {wishes['triangle']} per face")
     raise ValueError(f"values must have shape {wish}, got {values.shape}")
 
 
@@ -284,14 +285,19 @@ def draw_field(
     nodata = grid.nodata if nodata is None else nodata
     dtype = dtype_of_field(values.dtype, is_of_faces=is_of_faces, has_nodata=nodata is not None)
     empty, points_px = nodata_of(nodata, dtype), grid.to_pixels(points)
-    with Canvas.of(SCRATCH, "field", out, view.size[::-1], dtype) as (result, canvas):
+    with Canvas.of(SCRATCH, "field", out, (*view.size[::-1], *values.shape[1:]), dtype) as (result, canvas):
         ids = visible(points_px, triangles, view, Sink.LABEL)
         if is_of_faces:
-            np.take(np.append(values.astype(dtype), empty), ids, out=canvas, mode="wrap")  # id -1 is the last
-        else:
-            fill_planes(ids, points_px, triangles, values.astype(np.float64, copy=False), view, canvas)
+            rows = np.concatenate([values.astype(dtype), np.broadcast_to(empty, (1, *values.shape[1:]))])
+            np.take(rows, ids, axis=0, out=canvas, mode="wrap")  # id -1 is the last
+            return result
+        plane = canvas if values.ndim == 1 else SCRATCH.scratch("plane of a field", ids.shape, dtype)
+        for channel, column in enumerate(values.T if values.ndim == 2 else [values]):
+            fill_planes(ids, points_px, triangles, column.astype(np.float64, copy=False), view, plane)
             if not np.isnan(empty):  # which planes leave
-                canvas[ids < 0] = empty
+                plane[ids < 0] = empty
+            if plane is not canvas:
+                canvas[..., channel] = plane
     return result
 
 

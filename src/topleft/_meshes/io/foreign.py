@@ -53,11 +53,12 @@ CONVERTERS = {
     **dict.fromkeys(
         (".abc", ".usd", ".usda", ".usdc", ".usdz", ".wrl"), "Blender converts it: import it, and export glTF"
     ),
+    ".pvd": "it names a file for each time step: give one of these files",
     ".ifc": "ifcopenshell converts it: IfcConvert {name}.ifc {name}.glb",
     **dict.fromkeys((".brep", ".iges", ".igs"), "FreeCAD converts it: import it, and export STEP or OBJ"),
     **dict.fromkeys((".c4d", ".ma", ".max", ".mb", ".skp"), "the program that wrote it exports glTF"),
 }
-"""Formats without a reader, and programs that make glTF of them."""
+"""Formats without a reader, and the way to files that have one, by programs that make glTF for most."""
 BINARY_DXF = b"AutoCAD Binary DXF"
 
 COLORS_3MF = {"pid", "p1", "paint_color", "mmu_segmentation"}

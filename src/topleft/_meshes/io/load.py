@@ -157,12 +157,14 @@ def load(
 
 def load_cells(path: str | os.PathLike[str]) -> tuple[Any, Polygons]:
     """The mesh of meshio of a file that it reads, and the triangles of its cells. Errors and warnings are of `load`."""
-    from topleft._meshes.io.solvers import read_cells
+    from topleft._meshes.io.solvers import note_lost_views, read_cells
 
     source = _input_file(path, None)
     theirs, polygons = reading(source, lambda: read_cells(source, MESHIO_READERS[source.path.suffix.lower()]))
     if polygons is None:
         raise MeshError(f"{str(path)!r} has no triangles")
+    if source.path.suffix.lower() == ".msh":
+        note_lost_views(source)
     tell_files(source.files())
     tell(source.notes.lines, stacklevel=2)
     return theirs, polygons

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -48,6 +50,14 @@ def read_cells(source: InputFile, readers: Sequence[str]) -> tuple[Any, Polygons
     for kind in polygons.not_drawn:
         source.notes.add("cells not drawn", kind)
     return theirs, polygons
+
+
+def note_lost_views(source: InputFile) -> None:
+    """Note the data of Gmsh that meshio loses: all time steps of a view but the last."""
+    views = Counter(re.findall(rb'\$(Node|Element)Data\s+\d+\s+"?([^"\r\n]*)', source.content()))
+    for (_, name), n_steps in views.items():
+        if n_steps > 1:
+            source.notes.add("views of which the last step alone is read", name.decode(errors="replace"))
 
 
 def _read(source: InputFile, readers: Sequence[str]) -> Any:

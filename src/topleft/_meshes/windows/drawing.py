@@ -147,7 +147,7 @@ class Painter:
         values = None if self.values is None else self.values.array[:0]
         sample = kind.draw(self, Payload(np.empty(0, np.int32), nothing, values), Crop((0, 0), (1, 1)))
         self.dtype, self.empty, self.channels = sample.dtype, sample[0, 0].copy(), sample.shape[2:]
-        self.nodata = self.empty.item() if kind.has_nodata and not self.channels else None
+        self.nodata = self.empty.flat[0].item() if kind.has_nodata and self.empty.size else None
         if kind.depth is not None and self.n_components == 2:
             self.low = self.high = 0.0
 
@@ -157,7 +157,8 @@ class Painter:
         with np.errstate(all="ignore"):
             held = np.array(number).astype(self.dtype)[()]
         is_there = np.all(self.empty == number) or (number != number and np.all(self.empty != self.empty))
-        if not is_there and (self.channels or not (self.dtype.kind == "f" or held == number)):
+        has_one = self.kind.has_nodata or not self.channels  # which all channels share
+        if not is_there and not (has_one and (self.dtype.kind == "f" or held == number)):
             raise ValueError(f"nodata must be {self.empty.tolist()} or one {self.dtype}, as pixels are, got {nodata!r}")
         found = copy(self)
         if not is_there and "background" in self.kind.options:  # a value may be that of the background before
@@ -165,8 +166,8 @@ class Painter:
             found.learn(nothing)
         elif not is_there:
             found.outside = (self.empty if self.outside is None else self.outside[0]), held
-            found.empty = held
-        found.nodata = number if self.channels else held.item()
+            found.empty = np.full_like(self.empty, held)[()]
+        found.nodata = held.item() if has_one else number
         return found
 
     @property
@@ -229,7 +230,7 @@ class Painter:
         drawn = self.kind.draw(self, payload, crop)
         if self.outside is not None:
             empty, nodata = self.outside
-            drawn[np.isnan(drawn) if empty != empty else drawn == empty] = nodata
+            drawn[np.isnan(drawn) if np.isnan(empty).any() else drawn == empty] = nodata
         return drawn
 
 
