@@ -4,6 +4,7 @@ import inspect
 import linecache
 import traceback
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -204,8 +205,13 @@ CALLS = {
     "DepthLayers.layer": (LAYERS.layer, {"k": 0}),
     "Overlap.means": (TABLE.means, {"raster": np.ones((6, 8))}),
     "Overlap.sums": (TABLE.sums, {"raster": np.ones((6, 8))}),
+    **{f"Overlap.{name}": (getattr(TABLE, name), {"raster": np.ones((6, 8))})
+       for name in ("counts", "minima", "maxima", "stdevs", "majorities")},
+    "Overlap.quantiles": (TABLE.quantiles, {"raster": np.ones((6, 8)), "q": 0.5}),
     "Overlap.spread": (TABLE.spread, {"values": [1.0]}),
     "Plan.measure": (PLAN.measure, {"n_rounds": 1}),
+    "Grid.like": (tl.Grid.like, {"raster": SimpleNamespace(transform=(1, 0, 0, 0, -1, 0), width=8, height=6)}),
+    "Grid.to_xarray": (tl.Grid(SIZE, (0, 1, 0, 1)).to_xarray, {"array": np.ones((6, 8)), "name": None}),
     "Grid.to_pixels": (tl.Grid(SIZE, (0, 1, 0, 1)).to_pixels, {"points": FLAT}),
     "Camera.clip_from_eye": (CAMERA.clip_from_eye, {"size": SIZE}),
     "OpenCVLens.distort": (tl.OpenCVLens(k1=0.1).distort, {"points": POINTS}),

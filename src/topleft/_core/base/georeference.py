@@ -124,7 +124,11 @@ def frame_of_raster(raster: Any) -> tuple[Sequence[float], tuple[int, int], str 
             import rasterio
         except ImportError:
             raise MissingPackageError("Grid.like of a file needs the package rasterio: pip install rasterio") from None
-        with rasterio.open(raster) as dataset:
+        try:
+            dataset = rasterio.open(raster)
+        except OSError as error:
+            raise OSError(f"like cannot open {shown(raster)}: {error}") from None
+        with dataset:
             return frame_of_raster(dataset)
     if hasattr(raster, "transform") and hasattr(raster, "width") and hasattr(raster, "height"):  # of rasterio
         nodata = getattr(raster, "nodata", None)

@@ -223,10 +223,9 @@ class Grid:
         MissingPackageError
             If xarray is not installed.
         """
-        shape = np.shape(array)
-        if shape[:2] != self.size[::-1] or len(shape) not in (2, 3):
-            raise ValueError(f"array must have shape {self.size[::-1]} or one with channels, got {shape}")
-        own = array if hasattr(array, "shape") else np.asarray(array)
+        own = array if hasattr(array, "shape") else as_array("array", array)
+        if own.shape[:2] != self.size[::-1] or len(own.shape) not in (2, 3):
+            raise ValueError(f"array must have shape {self.size[::-1]} or one with channels, got {own.shape}")
         return data_array(own, name, self.x_centers, self.y_centers, self.transform, self.crs, self.nodata)
 
     @property
