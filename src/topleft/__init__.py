@@ -1,4 +1,33 @@
-"""Exact, watertight triangle rasterization on the CPU: NumPy arrays in, NumPy arrays out."""
+"""Exact, watertight triangle rasterization on the CPU: NumPy arrays in, NumPy arrays out.
+
+What most programs need:
+
+    load, Mesh, Scene           a mesh from a file or from arrays; meshes with poses
+    Camera                      framing, look_at, from_intrinsics and others
+    render, save_image          a picture of a mesh, and its file
+    render_layers               depth, ids, normals and more of a view
+    coverage, fill, rasterize   triangles in pixels to a mask, to colours, to ids and depth
+    polygons, overlap           polygons to masks and labels, to exact areas
+    field, height_map, Grid     values and heights of a mesh on a regular grid
+
+All names, by task:
+
+    triangles     coverage, overdraw, fill, rasterize, Fragments, Rasterizer
+    layers        rasterize_poses, FragmentsBatch, area_vjp, wireframe, bresenham_line, pixel_grid, peel, DepthLayers,
+                  composite, points, PointFragments, Points
+    polygons      polygons, overlap, Overlap, to_rle
+    meshes        load, as_mesh, Mesh, Instance, Scene, Material, Texture, Light, Fog, Environment
+    cameras       Camera, OpenCVLens, FisheyeLens, load_cameras, turntable, viewpoints
+    pictures      render, render_transparent, silhouette, save_image, render_batch, Job, simplify, Levels, Level,
+                  choose_detail, Detail
+    views         render_layers, ViewLayers, rasterize_mesh, SceneFragments, shade, object_masks, ObjectMasks,
+                  visible_layers, SceneDepthLayers
+    grids         field, height_map, Grid, voxelize, Voxels, bake, Baked, viewshed, Viewshed, visible_faces,
+                  VisibleFaces
+    tiles         tiles, Tiles, Window, merge
+    tools         plan, Plan, explore, Explorer, scenes, build_info, release_memory, __version__
+    errors        TopleftError, MeshError, ImageError, MissingPackageError, MeshWarning
+"""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ from topleft.errors import MeshWarning
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Return the exit status of the command line, `sys.argv` unless arguments are given."""
-    parser = _parser()
+    parser = parser_of_commands()
     options = parser.parse_args(arguments)
     if options.run is None:
         parser.print_help()
@@ -97,7 +97,8 @@ def run_info(_: argparse.Namespace) -> int:
     return 0
 
 
-def _parser() -> Parser:
+def parser_of_commands() -> Parser:
+    """Return the parser of all commands with their options."""
     parser = Parser(prog="topleft", description="Exact triangle rasterization on the CPU.")
     parser.add_argument("--version", action="version", version=f"topleft {build_info()['version']}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
