@@ -389,3 +389,68 @@ def test_field_of_vectors_with_as_many_faces_as_vertices_asks_which():
         tl.field((SQUARE, HALVES * 2), np.ones((4, 3)), (4, 3))
     with pytest.raises(ValueError, match=r"values must have shape \(4,\) or \(4, C\) per vertex or \(2,\) or \(2, C\)"):
         tl.field((SQUARE, HALVES), np.ones((4, 3, 3)), (4, 3))
+
+
+EDGES = {  # of VTK's quadratic cells, in the order of their points
+    "tetra": ["01", "12", "20", "03", "13", "23"],
+    "hexahedron": ["01", "12", "23", "30", "45", "56", "67", "74", "04", "15", "26", "37"],
+    "wedge": ["01", "12", "20", "34", "45", "53", "03", "14", "25"],
+    "pyramid": ["01", "12", "23", "30", "04", "14", "24", "34"],
+}
+MIDDLES = {
+    "hexahedron": ["0473", "1265", "0154", "3762", "0321", "4567", "01234567"],
+    "wedge": ["0143", "1254", "2035"],
+    "pyramid": ["0123"],
+}
+SOLIDS = {  # corners, and the volume
+    "tetra": ([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], 1 / 6),
+    "hexahedron": ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], 1.0),
+    "wedge": ([(0, 0, 0), (0, 1, 0), (1, 0, 0), (0, 0, 1), (0, 1, 1), (1, 0, 1)], 1 / 2),
+    "pyramid": ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)], 1 / 3),
+}
+CELLS = ["tetra10", "hexahedron20", "hexahedron24", "hexahedron27", "wedge15", "wedge18", "pyramid13", "pyramid14"]
+
+
+def quadratic(kind):
+    """The points of a quadratic solid cell with straight sides, and its volume."""
+    solid = kind.rstrip("0123456789")
+    corners, volume = SOLIDS[solid]
+    names = [*EDGES[solid], *MIDDLES.get(solid, [])][: int(kind[len(solid) :]) - len(corners)]
+    points = [*corners, *(np.mean([corners[int(i)] for i in name], axis=0) for name in names)]
+    return np.array(points, float), volume
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+@pytest.mark.parametrize("kind", CELLS)
+def test_skin_of_quadratic_solids_is_cut_between_all_points(kind, is_mirrored):
+    points, volume = quadratic(kind)
+    points[:, 0] *= -1 if is_mirrored else 1
+    mesh = tl.as_mesh(Cells(points, [(kind, [range(len(points))])]))
+    is_inside = np.isclose(np.abs(points), 0.5).all(axis=1) & (kind == "hexahedron27")
+    assert sorted(set(mesh.triangles.ravel())) == np.flatnonzero(~is_inside).tolist()
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    assert np.isclose((a * np.cross(b, c)).sum() / 6, volume)
+    center = points.mean(axis=0)
+    assert (((a + b + c) / 3 - center) * np.cross(b - a, c - a)).sum(axis=1).min() > 0
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert areas.max() < 4.1 * areas.min()  # no point on a wrong edge makes a sliver
+
+
+def test_skin_of_quadratic_solids_leaves_out_sides_between_two():
+    points, _ = quadratic("hexahedron20")
+    both = np.concatenate([points, points + [1, 0, 0]])
+    cells = [("hexahedron20", [range(20), range(20, 40)])]
+    _, first, names = np.unique(both, axis=0, return_index=True, return_inverse=True)
+    mesh = tl.as_mesh(Cells(both[first], [(kind, names.ravel()[np.array(rows)]) for kind, rows in cells]))
+    assert len(mesh.triangles) == 10 * 6
+    rows = names.ravel()[np.array([range(20), range(20, 40)])]
+    mixed = tl.as_mesh(Cells(both[first], [("hexahedron20", rows[:1]), ("hexahedron", rows[1:, :8])]))
+    assert len(mixed.triangles) == 5 * 6 + 5 * 2
+
+
+def test_field_of_a_quadratic_solid_has_values_in_the_middle_of_edges():
+    points, _ = quadratic("hexahedron20")
+    grid = tl.Grid((8, 8), (0, 1, 0, 1))
+    found = tl.field(Cells(points, [("hexahedron20", [range(20)])], {"u": points[:, 0] ** 2}), "u", grid)
+    x, _ = np.meshgrid(grid.x_centers, grid.y_centers)
+    assert np.abs(found - x**2).max() < 0.07

@@ -23,6 +23,9 @@ CUTS = {
 }
 """Triangles of the quadratic surface cells of meshio, between all of their points."""
 
+SIDES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+"""Surface cells by the number of their points, as sides of solids."""
+
 SURFACE_CELLS = ("triangle", "quad", "polygon", *CUTS)
 
 SIDES_OF_SOLID = {
@@ -34,6 +37,19 @@ SIDES_OF_SOLID = {
 }
 """Corners of the sides of solid cells, counter-clockwise seen from outside."""
 
+EDGES_OF_SOLID = {
+    "tetra": ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)),
+    "hexahedron": (
+        (0, 1), (1, 2), (2, 3), (0, 3), (4, 5), (5, 6), (6, 7), (4, 7), (0, 4), (1, 5), (2, 6), (3, 7),
+    ),
+    "wedge": ((0, 1), (1, 2), (0, 2), (3, 4), (4, 5), (3, 5), (0, 3), (1, 4), (2, 5)),
+    "pyramid": ((0, 1), (1, 2), (2, 3), (0, 3), (0, 4), (1, 4), (2, 4), (3, 4)),
+}  # fmt: skip
+"""Edges of solid cells in the order in which quadratic cells have points on them, behind the corners."""
+
+SIDES_WITH_MIDDLE = {"hexahedron": (5, 3, 2, 4, 0, 1), "wedge": (2, 3, 4), "pyramid": (0,)}
+"""Sides in the order in which cells have points in the middle of them, behind those of edges."""
+
 SOLID_OF_CELL = {
     "tetra": "tetra", "tetra10": "tetra", "hexahedron": "hexahedron", "hexahedron20": "hexahedron",
     "hexahedron24": "hexahedron", "hexahedron27": "hexahedron", "wedge": "wedge", "wedge15": "wedge",
@@ -43,7 +59,7 @@ SOLID_OF_CELL = {
 CELL_OF_VTK = {
     5: "triangle", 7: "polygon", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid",
     22: "triangle6", 23: "quad8", 24: "tetra10", 25: "hexahedron20", 26: "wedge15", 27: "pyramid13", 28: "quad9",
-    29: "hexahedron27", 34: "triangle7",
+    29: "hexahedron27", 32: "wedge18", 33: "hexahedron24", 34: "triangle7",
 }  # fmt: skip
 """The cells of VTK, by their numbers."""
 
@@ -189,23 +205,46 @@ class _Block(NamedTuple):
 
 
 def _skin(points: npt.NDArray[Any], solids: list[tuple[str, npt.NDArray[Any]]]) -> Polygons:
-    """Triangles of the sides of solid cells that no second cell has."""
+    """Triangles of the sides of solid cells that no second cell has, between all points of a side."""
     sides: dict[int, list[npt.NDArray[np.int64]]] = {3: [], 4: []}
+    width = 4 if all(cells.shape[1] <= 8 for _, cells in solids) else 9
     for kind, cells in solids:
-        sides_of_cell = SIDES_OF_SOLID[kind]
-        middle = points[cells[:, : 1 + max(max(side) for side in sides_of_cell)]].mean(axis=1)
-        for side in sides_of_cell:
-            rows = cells[:, side].astype(np.int64)
-            first, *_, last = corners = np.moveaxis(points[rows], 1, 0)
+        corners_of_sides = SIDES_OF_SOLID[kind]
+        middle = points[cells[:, : 1 + max(max(side) for side in corners_of_sides)]].mean(axis=1)
+        for side, points_of_side in zip(corners_of_sides, _points_of_sides(kind, cells.shape[1]), strict=True):
+            n = len(side)
+            rows = np.full((len(cells), width), -1, np.int64)
+            rows[:, : len(points_of_side)] = cells[:, points_of_side]
+            first, *_, last = corners = np.moveaxis(points[rows[:, :n]], 1, 0)
             # Programs do not agree which way round a wedge goes.
             is_inwards = (np.cross(corners[1] - first, last - first) * (corners.mean(axis=0) - middle)).sum(axis=1) < 0
-            rows[is_inwards] = rows[is_inwards][:, ::-1]
-            sides[len(side)].append(rows)
-    blocks = []
-    for rows in (np.concatenate(own) for own in sides.values() if own):
-        _, first, n_cells = np.unique(np.sort(rows, axis=1), axis=0, return_index=True, return_counts=True)
-        blocks.append(rows[np.sort(first[n_cells == 1])])
-    return _of_blocks(points, blocks)
+            turned = [*range(n)[::-1], *range(n, 2 * n - 1)[::-1], *range(2 * n - 1, 9)]
+            rows[is_inwards] = rows[is_inwards][:, [column for column in turned if column < width]]
+            sides[n].append(rows)
+    kept = []
+    for n, rows in ((n, np.concatenate(parts)) for n, parts in sides.items() if parts):
+        _, first, n_cells = np.unique(np.sort(rows[:, :n], axis=1), axis=0, return_index=True, return_counts=True)
+        rows = rows[np.sort(first[n_cells == 1])]
+        n_points = (rows != -1).sum(axis=1)
+        kept += [(SIDES[size], rows[n_points == size, :size]) for size in np.unique(n_points).tolist()]
+    return _of_surface(points, kept)
+
+
+def _points_of_sides(solid: str, n_points: int) -> list[list[int]]:
+    """The columns of cells with so many points that make each side: corners, middles of edges, the middle."""
+    edges, with_middle = EDGES_OF_SOLID.get(solid, ()), SIDES_WITH_MIDDLE.get(solid, ())
+    sides = SIDES_OF_SOLID[solid]
+    n_corners = 1 + max(max(side) for side in sides)
+    n_linear = n_corners + len(edges)
+    if not edges or n_points < n_linear:
+        return [list(side) for side in sides]
+    found = []
+    for i, side in enumerate(sides):
+        pairs = zip(side, (*side[1:], side[0]), strict=True)
+        middles = [n_corners + edges.index((min(pair), max(pair))) for pair in pairs]
+        center = [n_linear + with_middle.index(i)] if i in with_middle[: n_points - n_linear] else []
+        found.append([*side, *middles, *center])
+    return found
 
 
 def of_padded(subject: Any) -> Polygons:
