@@ -28,12 +28,9 @@ def views(*options, sizes=SIZES):
 
 def scenes(view):
     """Work as choices meet it: so many triangles, of which some are seen, in so many layers and rows each."""
-    for n, seen, layers, rows, scatter in product(
-        COUNTS[::3], (1.0, 0.06), (0.01, 0.3, 2.0, 30.0), (1.0, 4.2, 4.4, 40.0), (0.0, 0.4, 1.0)
-    ):
+    for n, seen, layers, rows in product(COUNTS[::3], (1.0, 0.06), (0.01, 0.3, 2.0, 30.0), (1.0, 4.2, 4.4, 40.0)):
         work = (seen * n, layers, min(rows * seen * n, layers * view.size[0] * view.size[1]))
-        mesh = SimpleNamespace(guess_scatter=lambda _, s=scatter: s)
-        yield SimpleNamespace(mesh=mesh, guess=work, n_triangles=n, n_vertices=n // 2, has_depth=True)
+        yield SimpleNamespace(guess=work, n_triangles=n, n_vertices=n // 2, has_depth=True)
 
 
 def surveys():
@@ -136,17 +133,17 @@ GRIDS = (
 #: Of each grid: cases, how many are not the commonest, and the beginning of a hash of all.
 DECIDED = {
     "arrays_by_threads": (96, 32, "278bfa1eff08511b"),
-    "draws_by_threads": (193536, 105366, "db0a20145174c260"),
+    "draws_by_threads": (64512, 35122, "a4fdd235a45a623f"),
     "shares": (192, 48, "deedb067a68f7d6a"),
     "clusters": (11664, 4492, "e0525a33df0266eb"),
     "sampled": (32832, 8994, "b88453e7e4a55581"),
     "instances": (24624, 9329, "5647fd5ae1372f66"),
-    "flat": (10752, 5238, "cae0f22b1ce82c8d"),
-    "sorting": (64512, 7382, "3ed8e8a7b0759050"),
-    "bounds": (10752, 3570, "1d9105453eb874e7"),
-    "blending": (86016, 73728, "2003423b2f6b9e5a"),
-    "colours": (10752, 4560, "783c5bea1de99436"),
-    "labels": (21504, 8832, "e91fcc0b80ed6bba"),
+    "flat": (3584, 1746, "8f1a4ea8ea41e1ec"),
+    "sorting": (21504, 2630, "2d1f9fff08607133"),
+    "bounds": (3584, 1190, "dc8188969683147d"),
+    "blending": (28672, 24576, "fa4ac31c7f40f8c6"),
+    "colours": (3584, 1520, "778993070f0538f7"),
+    "labels": (7168, 2944, "9f41a14eaea4aa86"),
     "split": (672, 289, "13a948a471d0955a"),
 }  # fmt: skip
 

@@ -65,7 +65,7 @@ def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads, in_place):
 def test_counts_and_colours_in_bands_equal_the_whole(force, isa):
     vertices, triangles = strewn(2)
     colors = np.random.default_rng(0).random((len(triangles), 2), np.float32)
-    force(saved_rows=0.0, saved_store=1e6)
+    force(saved_rows=0.0, saved_row=1e6)
     with on(isa):
         assert_bands_change_nothing(lambda: tl.overdraw(vertices, triangles, SIZE))
         assert_bands_change_nothing(lambda: tl.fill(vertices, triangles, colors, SIZE, per="triangle"))
@@ -123,10 +123,10 @@ def test_which_are_drawn_so():
 
     wide, tall = 1920, 1080
     rng = np.random.default_rng(0)
-    at = rng.random((20_000, 1, 3)) * [wide, tall, 1]
-    triangles = np.arange(60_000).reshape(-1, 3)
+    at = rng.random((30_000, 1, 3)) * [wide, tall, 1]
+    triangles = np.arange(90_000).reshape(-1, 3)
     for px, is_so in ((40, True), (2, False)):
-        vertices = (at + rng.uniform(-px, px, (20_000, 3, 3)) * [0.7, 0.7, 0]).reshape(-1, 3)
+        vertices = (at + rng.uniform(-px, px, (30_000, 3, 3)) * [0.7, 0.7, 0]).reshape(-1, 3)
         assert in_bands(vertices, triangles, (wide, tall)) is is_so
         assert not in_bands(vertices * [0.1, 0.1, 1], triangles, (wide // 10, tall // 10))
     for n, is_so in ((100, True), (400, False)):

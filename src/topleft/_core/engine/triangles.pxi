@@ -177,26 +177,6 @@ cdef class SnappedMesh:
         each = n_triangles / <double>n
         return n_seen * each, total * each / n_pixels, n_rows * each
 
-    def guess_scatter(self, int64_t n_rows) -> float:
-        """Estimate, from up to 64 triangles, the share that spans more than `n_rows` together with the next triangle.
-
-        0 where vertices are not snapped.
-        """
-        if self.exact is not None:
-            return 0.0
-        cdef const tl_vertex *v = self.snapped.mesh.vertices
-        cdef const int32_t *t
-        cdef int64_t n = min(self.snapped.n_triangles - 1, 64), i, k, last = self.snapped.mesh.n_vertices - 1, n_far = 0
-        cdef double far = n_rows * 2.0**self.subpixel_bits, low, high
-        for i in range(n):
-            t = self.snapped.triangles + 3 * (i * (self.snapped.n_triangles - 1) // n)
-            low, high = 2.0**62, -2.0**62
-            for k in range(4):  # the corners of triangle i, and a corner of the next
-                if 0 <= t[k] <= last:
-                    low, high = min(low, <double>v[t[k]].y_fx), max(high, <double>v[t[k]].y_fx)
-            n_far += high - low > far
-        return n_far / <double>max(1, n)
-
     def count_classes(self, int sink, int64_t width, int64_t height,
                       const int32_t[:, ::1] samples=None) -> tuple[int, list[tuple[int, float, float]]]:
         """Count the triangles by the code that draws them into a sink: `tl_census` in ``csrc/topleft.h``.

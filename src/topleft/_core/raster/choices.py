@@ -355,30 +355,21 @@ def drawing(view: View, work: Work, sink: Sink) -> Drawing:
 
 
 def pays_to_sort(view: View, work: Work, sink: Sink) -> bool:
-    """Tell whether triangles are sorted into bands of rows: few of a large picture, or each far from the last."""
+    """Tell whether triangles are sorted into bands of rows: a picture leaves the near cache, their rows are long."""
     costs, n_pixels, n = cost_table(), view.size[0] * view.size[1], work.n_triangles
     has_depth = sink in (Sink.NEAREST, Sink.FARTHEST, Sink.PAINT)
-    is_stored = has_depth or sink in (Sink.COUNT, Sink.LABEL)
     is_area = view.sampling is Sampling.AREA and sink is Sink.COUNT
-    if not is_stored or n_pixels <= costs.near_pixels or not (is_area or view.sampling is Sampling.CENTER):
+    is_stored = is_area or (view.sampling is Sampling.CENTER and (has_depth or sink in (Sink.COUNT, Sink.LABEL)))
+    near_pixels = costs.near_pixels * (1 if has_depth or is_area else 2)  # a sample without depth has half the bytes
+    if n == 0 or n_pixels <= near_pixels or not is_stored or not can_slice(view):
         return False
-    if n == 0 or not can_slice(view):
-        return False
-    n_seen, n_layers, n_rows = work.guess
+    n_seen, _, n_rows = work.guess
     if is_area:
         return costs.area_pixel * n_pixels + costs.area_row * n_rows > costs.area_triangle * n
-    n_covered = n_layers * n_pixels
-    cleared_ns = costs.cleared_pixel * n_pixels if has_depth else 0.0
-    met_ns = n_covered * costs.saved_store
-    if has_depth:
-        met_ns = n_rows * costs.saved_row + n_covered * costs.saved_sample
-    if n_rows < costs.saved_rows * n_seen:
-        met_ns = 0.0
-    sorted_ns = n_seen * costs.sorted_triangle + (n - n_seen) * costs.outside_triangle
-    if cleared_ns + met_ns <= sorted_ns:
-        return False
-    scatter = guess_scatter(view, work)
-    return cleared_ns + scatter * met_ns > sorted_ns + scatter * n_seen * costs.far_triangle
+    saved_ns = costs.cleared_pixel * n_pixels if has_depth else 0.0
+    if n_rows >= costs.saved_rows * n_seen:
+        saved_ns += n_rows * costs.saved_row
+    return saved_ns > n_seen * costs.sorted_triangle + (n - n_seen) * costs.outside_triangle
 
 
 def pays_to_sort_labels(view: View, work: Work, n_threads: int) -> bool:
@@ -403,11 +394,6 @@ def pays_to_bound(view: View, work: Work, sink: Sink) -> bool:
     return n_layers * width * height >= costs.bound_span * max(1.0, n_rows)
 
 
-def guess_scatter(view: View, work: Work) -> float:
-    """Return the share of triangles that are taller than a band of rows, or lie farther from the next."""
-    return work.mesh.guess_scatter(max(1, int(cost_table().far_pixels) // view.size[0]))
-
-
 def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool, is_packed: bool) -> int:
     """Return how many rows are blended before the next: a band that stays in the cache, where all are met again.
 
@@ -425,7 +411,7 @@ def rows_to_blend(view: View, work: Work, row_bytes: int, *, lays_ground: bool, 
     cost_ns = height / n_rows * looked_ns
     if view.sampling is Sampling.AREA:
         cost_ns += n_triangle_rows / n_rows * costs.blended_strip
-    return n_rows if n_again * costs.blended_pixel + again_ns * guess_scatter(view, work) > cost_ns else height
+    return n_rows if n_again * costs.blended_pixel + again_ns > cost_ns else height
 
 
 class Route(Enum):
