@@ -22,6 +22,7 @@ from benchmarks.peers import PEERS
 from benchmarks.pictures.study import STUDY as PICTURES
 from benchmarks.polygons.study import STUDY as POLYGONS
 from benchmarks.real_files.study import STUDY as REAL_FILES
+from benchmarks.report.everything import measure_all
 from benchmarks.report.pages import with_parts
 from benchmarks.report.study import Study
 from benchmarks.run.study import STUDY as RUN
@@ -63,6 +64,10 @@ def parser() -> argparse.ArgumentParser:
         add = commands.add_parser(study.kind, help=study.help)
         add.set_defaults(action=functools.partial(measure, study))
         add_options(add, study.options)
+
+    add = commands.add_parser("all", help="measure all records of the pages anew, and write tables and charts: hours")
+    add.set_defaults(action=lambda options: measure_all(options.out, lambda kind: STUDIES[kind].charts is not None))
+    add.add_argument("-o", "--out", type=Path, metavar="FOLDER", help="what it has is kept (build/records-COMMIT)")
 
     add = commands.add_parser("report", help="print tables again")
     add.set_defaults(action=report)

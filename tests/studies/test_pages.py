@@ -5,14 +5,11 @@ import re
 
 import pytest
 from benchmarks import cli
-from benchmarks.harness.machine import PAGES, RECORDS, ROOT
+from benchmarks.harness.machine import RECORDS, ROOT
+from benchmarks.report.everything import EVERY
 from benchmarks.report.pages import MARKED, with_parts
 
-FILLED = {
-    "accuracy": ["accuracy.md", "speed.md"], "atlas": ["atlas.md"], "batch": ["performance.md"],
-    "choices": ["choices.md"], "layers": ["performance.md"], "pictures": ["pictures.md"],
-    "scenes": ["performance.md"], "smooth": ["performance.md"], "static": ["static.md"],
-}  # fmt: skip
+FILLED = {name: [ROOT / "docs" / page for page in pages.split()] for name, (_, pages) in EVERY.items()}
 """Pages by the record that they show."""
 
 
@@ -23,14 +20,14 @@ def record_of(name):
 
 @pytest.mark.parametrize(("name", "page"), [(name, page) for name, pages in FILLED.items() for page in pages])
 def test_page_tables_are_those_of_the_record(name, page):
-    text, record = (PAGES / page).read_text(encoding="utf-8"), record_of(name)
-    files = " ".join(str(path.relative_to(ROOT)) for path in (RECORDS / f"{name}.json", PAGES / page))
+    text, record = page.read_text(encoding="utf-8"), record_of(name)
+    files = " ".join(str(path.relative_to(ROOT)) for path in (RECORDS / f"{name}.json", page))
     assert with_parts(text, record, cli.parts_of(record)) == text, f"run: python -m benchmarks document {files}"
 
 
 @pytest.mark.parametrize("name", FILLED)
 def test_pages_show_every_part_once(name):
-    texts = [(PAGES / page).read_text(encoding="utf-8") for page in FILLED[name]]
+    texts = [page.read_text(encoding="utf-8") for page in FILLED[name]]
     marked = [found[1] for text in texts for found in MARKED.findall(text)]
     parts = cli.study_of(record_of(name)).parts
     assert sorted(part for part in marked if part in parts) == sorted(parts)
@@ -61,6 +58,13 @@ def test_page_or_record_that_lacks_a_part_is_refused(text, message):
     del record["scaling"]
     with pytest.raises(ValueError, match=message):
         with_parts(text, record, cli.study_of(record).parts)
+
+
+def test_all_measures_every_record_by_commands_that_there_are():
+    own = {"real_files"}  # of files of others
+    assert {path.stem for path in RECORDS.glob("*.json")} == EVERY.keys() | own
+    for command, _ in EVERY.values():
+        assert cli.parser().parse_args(command.split()).action.func is cli.measure
 
 
 def test_commands_refuse_what_does_not_fit(tmp_path, capsys):
