@@ -1,4 +1,4 @@
-"""Charts (a) and (b) of an accuracy record, time against error, and the list of all charts. Needs matplotlib."""
+"""Charts of an accuracy record, time against error, and the list of all charts. Needs matplotlib."""
 
 from __future__ import annotations
 
@@ -29,8 +29,35 @@ PEER_LETTERS = {
     "skimage": "Si", "agg": "Ag", "aggdraw": "Ad", "blend2d": "Bl",
 }  # fmt: skip
 """The text in the marker of a peer."""
+PEER_NAMES = {"opencv": "OpenCV", "pillow": "Pillow", "skimage": "scikit-image"}
 PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 10.5, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
-SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "area"}
+SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "topleft, area"}
+
+
+def chart_peers(record: dict[str, Any]) -> Figure:
+    """Return the chart of topleft beside other programs alone: triangles of 40 px, a name beside each mark."""
+    family = next(family for family in record["families"] if family["name"] == "medium")
+    none_wrong = 0.3e6 / family["n_edge_px"]  # where zero stands on a logarithmic axis
+    rows = [row for row in with_no_snap(record) if (row["family"], row["method"]) == ("medium", "auto")]
+    figure, axis = plt.subplots(figsize=(4.6, 3.9), layout="constrained")
+    draw_grid(axis)
+    for row in rows + rows_of(record, "peers", family):
+        x, y = row["ns_triangle"], 1e6 * row["wrong_px"] / family["n_edge_px"] or none_wrong
+        if "peer" in row:
+            axis.plot(x, y, "s", color="#8A1C1C", ms=6)
+            is_low = row["peer"] in ("datashader", "pillow")  # whose neighbour has its name above the mark
+            axis.annotate(PEER_NAMES.get(row["peer"], row["peer"]), (x, y), (0, -13 if is_low else 7),
+                          textcoords="offset points", ha="center", color="#8A1C1C")  # fmt: skip
+        else:
+            bits = "exact" if row["precision"] == NO_SNAP else f"{row['precision']} bits"
+            axis.plot(x, y, "o", color="black", ms=7)
+            axis.annotate(f"topleft, {bits}", (x, y), (-7, 0), textcoords="offset points", ha="right", va="center")
+    axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
+    axis.set(xscale="log", yscale="log", xlim=(5, 3e5), ylim=(none_wrong / 3, 3e6))
+    axis.set(xlabel="time per triangle", ylabel="wrong of a million edge pixels (grey: none)")
+    axis.xaxis.set_major_formatter(lambda value, _: duration(value))
+    axis.xaxis.set_minor_locator(NullLocator())
+    return figure
 
 
 def chart_coverage(record: dict[str, Any]) -> Figure:
@@ -60,7 +87,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         for row, (_, y) in zip(rows, points, strict=True):
             if row["method"] == "auto":
                 bits = "exact" if row["precision"] == NO_SNAP else f"{row['precision']} bits"
-                axis.text(0.015, y, bits, transform=axis.get_yaxis_transform(), va="center",
+                axis.text(0.015, y, f"topleft, {bits}", transform=axis.get_yaxis_transform(), va="center",
                           fontsize=8, color="0.25")  # fmt: skip
         axis.set(xscale="log", yscale="log", ylim=(none_wrong / 3, 3e6))
         axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
@@ -68,7 +95,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
                   ha="right", fontsize=7, color="0.35")  # fmt: skip
         times = [row["ns_triangle"] for row in rows + twins + peers]
         low, high = min(times), max(times)
-        axis.set_xlim(low / (high / low) ** 0.18, high * (high / low) ** 0.05)
+        axis.set_xlim(low / (high / low) ** 0.38, high * (high / low) ** 0.06)
     finish(figure, axes, "wrong pixels per million edge pixels")
     seen = {row["method"].partition("/")[0] for row in record["coverage"]}
     handles = [
@@ -82,7 +109,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         front_handle(),
         *peer_handles(record["peers"]),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8.5, labelspacing=0.7)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, labelspacing=0.5, columnspacing=1)
     return figure
 
 
@@ -110,7 +137,7 @@ def chart_antialiasing(record: dict[str, Any]) -> Figure:
     label = "topleft: samples a pixel, or exact area"
     handles = [Line2D([], [], color="black", marker="o", lw=0.8, ms=6, label=label), front_handle()]
     handles += peer_handles(record["antialiasing"])
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=8.5, columnspacing=1.2)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8, columnspacing=1)
     return figure
 
 
@@ -138,27 +165,24 @@ def front_handle() -> Line2D:
 
 
 def panels(record: dict[str, Any]) -> tuple[Figure, list[Axes]]:
-    """Return a figure of two columns, a panel for each family of triangles."""
+    """Return a figure that a phone can show, a panel below the other for each family of triangles."""
     families = record["families"]
-    figure, grid = plt.subplots((len(families) + 1) // 2, 2, figsize=(9, 8.6), squeeze=False, layout="constrained")
-    axes = list(grid.flat)
-    for axis in axes[len(families) :]:
-        axis.set_axis_off()
-    for axis, family in zip(axes, families, strict=False):
+    n = len(families)
+    figure, grid = plt.subplots(n, 1, figsize=(4.6, 3.1 * n + 1.6), squeeze=False, layout="constrained")
+    for axis, family in zip(grid.flat, families, strict=True):
         axis.set_title(f"{family['name']}: {family['what']}", loc="left")
         draw_grid(axis)
-    return figure, axes[: len(families)]
+    return figure, list(grid.flat)
 
 
 def finish(figure: Figure, axes: list[Axes], y_label: str) -> None:
-    """Name the axes once a row or column, ticks with units on x."""
-    for i, axis in enumerate(axes):
+    """Name the axes once, ticks with units on x."""
+    for axis in axes:
         low, high = axis.get_xlim()
         axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 300 * low else (1,)))
         axis.xaxis.set_minor_locator(NullLocator())
         axis.xaxis.set_major_formatter(lambda value, _: duration(value))
-        if i >= len(axes) - 2:
-            axis.set_xlabel("time per triangle")
+    axes[-1].set_xlabel("time per triangle")
     figure.supylabel(y_label, fontsize=9)
 
 
@@ -181,6 +205,7 @@ def pareto_front(points: list[Point]) -> Iterator[Point]:
 
 
 CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
+    "accuracy-peers": chart_peers,
     "accuracy-coverage": chart_coverage,
     "accuracy-antialiasing": chart_antialiasing,
     "accuracy-depth": speed_charts.chart_depth,

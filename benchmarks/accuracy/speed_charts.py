@@ -9,6 +9,7 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 
 from benchmarks.accuracy.tutorial import QUOTED
 from benchmarks.harness.records import Record
@@ -29,7 +30,8 @@ SERIES = [
 def chart_depth(record: Record) -> Figure:
     """Return chart (c): a panel for each near/far ratio, a line for each format."""
     ratios = list(dict.fromkeys(row["ratio"] for row in record["depth"]))
-    figure, axes = plt.subplots(1, len(ratios), figsize=(9, 3.9), sharey=True, layout="constrained", squeeze=False)
+    n = len(ratios)
+    figure, axes = plt.subplots(n, 1, figsize=(4.6, 2.6 * n + 1), sharex=True, layout="constrained", squeeze=False)
     for axis, ratio in zip(axes.flat, ratios, strict=True):
         for name, (color, line, marker, label) in FORMAT_LOOKS.items():
             rows = [row for row in record["depth"] if (row["format"], row["ratio"]) == (name, ratio)]
@@ -41,21 +43,24 @@ def chart_depth(record: Record) -> Figure:
         axis.set_title(f"far plane {ratio:,} x near plane", loc="left")
         axis.set_xticks(range(4, max(bits) + 1, 4), [f"$2^{{-{tick}}}$" for tick in range(4, max(bits) + 1, 4)])
         draw_grid(axis)
-    axes[0, 0].set_ylabel("pixels that show the sheet behind, %")
-    axes[0, len(ratios) // 2].set_xlabel("gap between the sheets, as a part of their distance")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8.5)
+    figure.supylabel("pixels that show the sheet behind, %", fontsize=9)
+    axes[-1, 0].set_xlabel("gap between the sheets, as a part of their distance")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", fontsize=8)
     return figure
 
 
 def chart_sizes(record: Record) -> Figure:
     """Return chart (d): time per triangle by its area, a line for each method, and the time of memory."""
-    figure, axis = plt.subplots(figsize=(9, 5.6), layout="constrained")
+    figure, axis = plt.subplots(figsize=(4.6, 5.6), layout="constrained")
     rows = [row for row in record["sizes"] if "/" not in row["method"]]
     for name in dict.fromkeys(row["method"] for row in rows):
         own = [row for row in rows if row["method"] == name and row["ns_triangle"] > 0]
         look = LOOKS[name]
         axis.plot([row["area_px"] for row in own], [row["ns_triangle"] for row in own], color=look.color,
                   marker=look.marker, ms=5.5, mec="black", mew=0.5, lw=1.3, label=look.label)  # fmt: skip
+        if name == "auto":
+            middle = own[len(own) // 3]
+            axis.annotate("topleft", (middle["area_px"], middle["ns_triangle"]), (4, -12), textcoords="offset points")
     areas = [row["area_px"] for row in rows]
     memory = record["memory"]
     floors = (("frame", "--", "memset of the area, in the cache"), ("stream", ":", "the same, in memory"))
@@ -67,31 +72,32 @@ def chart_sizes(record: Record) -> Figure:
     axis.set(xscale="log", yscale="log", ylim=(lowest / 3, None))
     axis.set(xlabel="area of the triangle, pixels", ylabel="time per triangle")
     axis.yaxis.set_major_formatter(lambda value, _: duration(value))
+    axis.xaxis.set_major_locator(LogLocator(base=100))
     axis.xaxis.set_major_formatter(lambda value, _: count_text(value))
     draw_grid(axis)
-    axis.legend(loc="upper left", fontsize=8.5, ncols=2)
+    figure.legend(loc="outside lower center", fontsize=8, ncols=2)
     return figure
 
 
 def chart_scaling(record: Record) -> Figure:
     """Return chart (e): time by number of triangles for each number of threads, and how much faster threads are."""
     counts = sorted({row["threads"] for row in record["scaling"]})
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.1), layout="constrained")
+    figure, (upper, lower) = plt.subplots(2, 1, figsize=(4.6, 6.4), layout="constrained")
     for (color, marker, line), n in zip(SERIES, counts, strict=False):
         rows = [row for row in record["scaling"] if row["threads"] == n]
         numbers = [row["n_triangles"] for row in rows]
         label = f"{n} thread{'s' * (n > 1)}"
-        left.plot(numbers, [1e6 * row["ms"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
+        upper.plot(numbers, [1e6 * row["ms"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
         if n > 1:
-            right.plot(numbers, [row["faster"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
-    left.set(xscale="log", yscale="log", xlabel="triangles", ylabel="time of a picture, 1920x1080")
-    left.yaxis.set_major_formatter(lambda value, _: duration(value))
-    left.legend(loc="upper left", fontsize=8.5)
-    right.set(xscale="log", ylim=(0, max(counts) * 1.08), xlabel="triangles", ylabel="times as fast as one thread")
+            lower.plot(numbers, [row["faster"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
+    upper.set(xscale="log", yscale="log", xlabel="triangles", ylabel="time of a picture, 1920x1080")
+    upper.yaxis.set_major_formatter(lambda value, _: duration(value))
+    upper.legend(loc="upper left", fontsize=8.5)
+    lower.set(xscale="log", ylim=(0, max(counts) * 1.08), xlabel="triangles", ylabel="times as fast as one thread")
     for n in counts:
-        right.axhline(n, color="0.6", lw=0.8, ls=":")
-    right.legend(loc="lower right", fontsize=8.5)
-    for axis in (left, right):
+        lower.axhline(n, color="0.6", lw=0.8, ls=":")
+    lower.legend(loc="lower right", fontsize=8.5)
+    for axis in (upper, lower):
         draw_grid(axis)
     return figure
 
@@ -99,7 +105,7 @@ def chart_scaling(record: Record) -> Figure:
 def chart_tutorial(record: Record) -> Figure:
     """Return chart (f): pictures of eleven triangles a second, fills alone, and by calls."""
     rows = sorted(record["tutorial"], key=lambda row: row["fills"])
-    figure, axis = plt.subplots(figsize=(9, 0.25 * len(rows) + 1.3), layout="constrained")
+    figure, axis = plt.subplots(figsize=(4.6, 0.25 * len(rows) + 2.1), layout="constrained")
     for i, row in enumerate(rows):
         color = "#FFFFFF" if row["is_pure"] else LOOKS[row["method"].partition("/")[0]].color
         axis.barh(i, row["fills"], color=color, height=0.62, edgecolor="black", lw=0.5,
@@ -109,10 +115,12 @@ def chart_tutorial(record: Record) -> Figure:
         axis.text(row["fills"] * 1.1, i, count_text(row["fills"]), va="center", fontsize=8)
         if row["method"] in QUOTED:
             axis.plot(QUOTED[row["method"]], i, "*", color="white", mec="black", ms=11, zorder=4)
-    axis.set_yticks(range(len(rows)), [row["method"] for row in rows])
+    names = [row["method"] for row in rows]
+    axis.set_yticks(range(len(rows)), [LOOKS[name].label if name in LOOKS else name for name in names])
     low, high = (of(row["fills"] for row in rows) for of in (min, max))
     axis.set(xscale="log", xlim=(low / 2, high * 3), ylim=(-0.6, len(rows) - 0.4))
-    axis.set_xlabel("pictures of the eleven triangles a second, 640x400")
+    axis.set_xlabel("pictures a second, 640x400")
+    axis.xaxis.set_major_locator(LogLocator(base=100))
     axis.xaxis.set_major_formatter(lambda value, _: count_text(value))
     axis.grid(axis="x", color="0.88", lw=0.6)
     axis.set_axisbelow(True)
@@ -122,5 +130,5 @@ def chart_tutorial(record: Record) -> Figure:
         Line2D([], [], marker="D", color="white", mec="black", ms=5, ls="", label="whole calls, with checks and clear"),
         Line2D([], [], marker="*", color="white", mec="black", ms=11, ls="", label="what a tutorial reports"),
     ]
-    axis.legend(handles=handles, loc="lower right", fontsize=8.5)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8)
     return figure

@@ -33,9 +33,9 @@ class Look(NamedTuple):
 
 
 LOOKS = {
-    "auto": Look("engine (auto)", "#000000", "o"),
-    "edge": Look("engine, edge", "#0072B2", "s"),
-    "scanline": Look("engine, scanline", "#56B4E9", "D"),
+    "auto": Look("topleft (auto)", "#000000", "o"),
+    "edge": Look("topleft, edge", "#0072B2", "s"),
+    "scanline": Look("topleft, scanline", "#56B4E9", "D"),
     "edge_increment": Look("edge_increment", "#009E73", "^"),
     "zigzag": Look("zigzag", "#009E73", "v"),
     "point_in_triangle": Look("point_in_triangle", "#D55E00", "P"),
