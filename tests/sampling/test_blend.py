@@ -402,6 +402,14 @@ def test_blend_by_area_of_a_whole_pixel_is_the_blend_without_area(blend, color, 
 
 
 @ON_EACH_ISA
+def test_blend_by_area_draws_the_least_area(isa):
+    corners, under = [[0, 0], [2**-12, 0], [0, 2**-11]], np.zeros((1, 1, 1), np.float32)
+    view = {"per": "triangle", "blend": "add", "sampling": "area", "subpixel_bits": 16}
+    with on(isa):
+        assert tl.fill(corners, [[0, 1, 2]], [[1.0]], (1, 1), **view, out=under).item() == 2.0**-24
+
+
+@ON_EACH_ISA
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_areas_far_away_stay_in_their_own_cells(dtype, isa):
     """Strips of triangles beyond 2**30 sub-pixels are as wide as the window, however narrow the triangles are."""
