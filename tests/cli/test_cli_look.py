@@ -177,8 +177,9 @@ def test_white_mesh_keeps_its_outline_on_the_default_background(run, folder, col
 
 
 def test_dark_mesh_stands_on_white(run, folder):
-    (folder / "a.mtl").write_text("newmtl m\nKd 0.5 1 1\n")
-    (folder / "a.obj").write_text("mtllib a.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nusemtl m\nf 1 2 3\n")
+    (folder / "a.mtl").write_text("newmtl m\nKd 0.5 1 1\nnewmtl n\nKd 0.5 1 0.9\n")
+    faces = "usemtl m\nf 1 2 3\nusemtl n\nf 3 2 1\n"
+    (folder / "a.obj").write_text("mtllib a.mtl\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\n" + faces)
     assert run("render", "a.obj", "-o", "a.jpg", *SMALL) == (0, [])
     with Image.open("a.jpg") as image:
         assert np.asarray(image)[0, 0].tolist() == [255] * 3

@@ -72,7 +72,7 @@ def test_labels_go_to_a_zarr_with_levels(tmp_path, pair):
     assert np.array_equal(chunk_of(out / "1/labels/c/0/0", "<i4", (32, 32))[:24], whole[::2, ::2])
 
 
-@pytest.mark.parametrize("bits", [0, "exact"])
+@pytest.mark.parametrize("bits", [0, 9, "exact"])
 def test_subpixel_bits_reach_the_raster(tmp_path, pair, bits):
     out = tmp_path / "labels.zarr"
     arguments = ["--labels", "--size", "64x48", "--uncompressed", "--quiet", "--subpixel-bits", str(bits)]

@@ -213,6 +213,12 @@ def test_mesh_of_trimesh_has_its_faces_with_normals_of_vertices_or_of_faces(smoo
     assert_same(drawn.normals[drawn.triangles], expected)
 
 
+def test_material_of_trimesh_is_rougher_the_less_it_shines():
+    own, material = ball_like(), SimpleNamespace(diffuse=[255, 0, 0, 255], image=None, kwargs={"Ns": [30.0]})
+    own.visual = SimpleNamespace(defined=True, kind="texture", uv=None, material=material)
+    assert pr.Mesh.from_trimesh(own).primitives[0].material.roughnessFactor == 0.5
+
+
 @pytest.mark.parametrize(
     ("mode", "expected"), [(5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]), (6, [[0, 1, 2], [0, 2, 3], [0, 3, 4]])]
 )

@@ -64,6 +64,7 @@ def test_colors_of_pixels_are_theirs():
     svg = tl.pixel_grid(colors)
     assert 'fill="#0963c8"' in svg
     assert 'fill="#010203"' in svg
+    assert tl.pixel_grid(np.array([[0, 5]])) == tl.pixel_grid(np.array([[0.0, 5]]))  # counts are no ids
 
 
 @pytest.mark.parametrize(

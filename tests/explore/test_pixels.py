@@ -340,6 +340,9 @@ def test_arrays_of_a_file_are_magnified(folder):
     np.savez("sized.npz", vertices=np.zeros((3, 3)), triangles=np.array([[0, 1, 2]]), size=np.array([8, 6]))
     assert content_of_name("sized.npz").pixels["size"] == [8, 6]
     assert content_of_name("sized.npz", (7, 5)).pixels["size"] == [7, 5]
+    np.savez("empty.npz", vertices=np.zeros((0, 2)), triangles=np.zeros((0, 3), int))
+    empty = content_of_name("empty.npz").pixels
+    assert (empty["origin"], empty["size"]) == ([0, 0], [16, 16])
 
 
 def test_mesh_or_arrays_without_a_size_in_space_are_a_mesh(folder):

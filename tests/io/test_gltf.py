@@ -436,7 +436,11 @@ def test_gltf_instances_are_all_there(load):
 
 @pytest.mark.parametrize(
     ("diffuse", "specular", "expected", "metallic"),
-    [([1, 0, 0, 0.5], [0.04] * 3, (255, 0, 0), 0), ([0, 0, 0, 0.5], [1, 0.5, 0], (255, 188, 0), 1)],
+    [
+        ([1, 0, 0, 0.5], [0.04] * 3, (255, 0, 0), 0),
+        ([0, 0, 0, 0.5], [1, 0.5, 0], (255, 188, 0), 1),
+        ([0.24 / 0.73] * 3 + [0.5], [0.27] * 3, (188, 188, 188), 0.5),  # of 0.5, half of it metal
+    ],
 )
 def test_gltf_spec_gloss_material_is_made_metallic_rough_and_told(tmp_path, diffuse, specular, expected, metallic):
     gloss = {"diffuseFactor": diffuse, "specularFactor": specular, "glossinessFactor": 0.75}

@@ -86,6 +86,11 @@ def test_shape_has_no_empty_triangle_and_no_spare_vertex(name):
     assert np.array_equal(np.unique(triangles), np.arange(len(vertices)))
 
 
+def test_icosahedron_is_regular():
+    vertices, triangles = scenes.shape("icosahedron")
+    assert np.ptp(np.linalg.norm(vertices[triangles] - vertices[np.roll(triangles, 1, axis=1)], axis=2)) < 1e-12
+
+
 def test_shape_takes_parameters():
     assert len(scenes.shape("icosphere", subdivisions=1)[1]) == 80
 
