@@ -1,5 +1,6 @@
 """Animations of glTF: where nodes, skins and morph targets are at a time."""
 
+import json
 import warnings
 
 import numpy as np
@@ -108,6 +109,26 @@ def test_animated_node_takes_its_children_and_cameras_with_it(load):
     assert np.allclose(np.linalg.inv(camera.view)[:3, 3], [3, 2, 1])
     (camera,) = load(file, load=tl.load_cameras)
     assert np.allclose(np.linalg.inv(camera.view)[:3, 3], [0, 0, 0])
+
+
+def test_cameras_of_an_animation_are_read_with_the_root_and_limits_of_load(tmp_path):
+    file = GltfFile(cameras=[{"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 1, "zfar": 9}}])
+    file.node(camera=0)
+    file.tree["scenes"] = [{"nodes": [0]}]
+    animation(file, "translation", [0, 1], [[1, 1, 1], [3, 2, 1]])
+    (tmp_path / "meshes").mkdir()
+    path = tmp_path / "meshes" / "a.gltf"
+    (tmp_path / "a.bin").write_bytes(bytes(file.blob))
+    file.tree["buffers"] = [{"byteLength": len(file.blob), "uri": "../a.bin"}]
+    path.write_text(json.dumps(file.tree))
+    with pytest.raises(MeshError):
+        tl.load_cameras(path, time=1)
+    (camera,) = tl.load_cameras(path, time=1, root=tmp_path)
+    assert np.allclose(np.linalg.inv(camera.view)[:3, 3], [3, 2, 1])
+    with pytest.raises(MeshError, match="more than the 0 of max_nodes"):
+        tl.load_cameras(path, time=1, root=tmp_path, max_nodes=0)
+    with pytest.raises(TypeError, match=r"limits are max_bytes, .*, got 'max_cameras'"):
+        tl.load_cameras(path, max_cameras=1)
 
 
 @pytest.mark.parametrize("interpolation", ["LINEAR", "CUBICSPLINE"])

@@ -29,7 +29,7 @@ from topleft._apps.cli.arguments import FAILED, REFUSED, UsageError
 from topleft._apps.cli.job_file import read_jobs
 from topleft._apps.cli.report import TOLD, check_report, complain, complain_of_lacks, one_line, write_report
 from topleft._apps.cli.sheet import make_sheet
-from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, folders_of, plan_jobs
+from topleft._apps.cli.targets import MeshJobs, check_targets, check_words, folders_of, plan_jobs, sheet_background
 from topleft._core.base.defaults import PICTURE_SUFFIXES
 from topleft._core.base.remote import is_url
 from topleft.errors import MeshWarning, MissingPackageError
@@ -84,7 +84,8 @@ def run_render(options: argparse.Namespace) -> int:
                 save_animation(path, _color_files(group), fps=options.fps, background=opaque)
         if options.sheet:
             Path(options.sheet).parent.mkdir(parents=True, exist_ok=True)
-            sheet = make_sheet([_color_files(group) for group in groups], captions_of(groups), reasons)
+            files = [_color_files(group) for group in groups]
+            sheet = make_sheet(files, captions_of(groups), reasons, sheet_background(options))
             save_image(options.sheet, sheet)
     is_broken = any(BROKEN in line for line in lacks)
     return FAILED if failed or is_broken or (options.strict and any(AT_REST not in line for line in lacks)) else 0

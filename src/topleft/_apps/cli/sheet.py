@@ -20,9 +20,12 @@ PAPER, INK, ALARM = (255, 255, 255), (60, 60, 60), (176, 0, 32)
 
 
 def make_sheet(
-    files: Sequence[Sequence[Path]], captions: Sequence[str], reasons: Sequence[str] = ()
-) -> npt.NDArray[np.uint8]:
+    files: Sequence[Sequence[Path]], captions: Sequence[str], reasons: Sequence[str] = (),
+    background: tuple[int, int, int, int] | None = None,
+) -> npt.NDArray[np.uint8]:  # fmt: skip
     """Return a sheet of the pictures of each mesh; where a picture is missing, its cell says the reason.
+
+    `background`: of cells without a picture; that of the sheet unless given.
 
     Several pictures of several meshes: a row for each mesh. Otherwise the rows make the sheet about square.
     """
@@ -54,7 +57,9 @@ def make_sheet(
     for (row, column), picture in pictures.items():
         left, top = GAP + column * step_x, GAP + row * step_y
         sheet.paste(picture, (left + (width - picture.width) // 2, top + (height - picture.height) // 2), picture)
+    blank = Image.new("RGBA", (width, height), background or (*PAPER, 255))
     for (row, column), reason in missing.items():
+        sheet.paste(blank, (GAP + column * step_x, GAP + row * step_y), blank)
         lines = wrapped(reason, width - 4, pen.textlength)[: max(1, height // LINE_HEIGHT)]
         pen.text((GAP + column * step_x + 2, GAP + row * step_y), "\n".join(lines), fill=ALARM, spacing=2)
     for i, caption in enumerate(captions):

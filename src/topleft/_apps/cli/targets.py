@@ -209,12 +209,12 @@ class FileCamera(FromFile):
     time: float | None = None
     clip: int | str | None = None
     scale: float = 1.0
+    limits: tuple[tuple[str, Any], ...] = ()
 
     def __call__(self, mesh: Mesh, size: tuple[int, int]) -> Camera:  # noqa: ARG002
         """Read it."""
-        cameras = (
-            [] if self.path in SHAPES else load_cameras(self.path, time=self.time, clip=self.clip, scale=self.scale)
-        )
+        how: dict[str, Any] = {"time": self.time, "clip": self.clip, "scale": self.scale, **dict(self.limits)}
+        cameras = [] if self.path in SHAPES else load_cameras(self.path, **how)
         if self.index >= len(cameras):
             raise MeshError(f"--camera {self.index}: {self.path!r} has {len(cameras)} cameras")
         return cameras[self.index]
@@ -264,7 +264,7 @@ def plan_jobs(options: argparse.Namespace, start: int = 0) -> list[MeshJobs]:
             filled = filled.replace("{folder}", folders[i_mesh - start])
             camera: Orbit | ClipOrbit | FileCamera = of_clip if len(times) > options.views else _orbit(options, i_view)
             if options.camera is not None:
-                camera = FileCamera(source, options.camera, time, options.clip, options.scale)
+                camera = FileCamera(source, options.camera, time, options.clip, options.scale, limits)
             path = filled.replace("{name}", name)
             layers = _layers(path, options)
             jobs.append(Job(mesh, camera, options.size, drawing, path, layers, depth_scale=options.depth_scale))
@@ -336,13 +336,18 @@ def default_sampling(options: argparse.Namespace) -> str:
     return str(Sampling.MSAA4 if is_light and is_picture else Sampling.CENTER)
 
 
+def sheet_background(options: argparse.Namespace) -> tuple[int, int, int, int] | None:
+    """The background that is given, or that of all cells of a sheet of several meshes; None: each mesh has its own."""
+    return options.background or (BACKDROP if options.sheet and len(options.meshes) > 1 else None)
+
+
 def _render_options(options: argparse.Namespace) -> dict[str, Any]:
     if (options.shading == "matcap") != (options.matcap is not None):
         raise UsageError("--shading matcap and --matcap FILE go together")
     drawing = {
         "shading": options.shading,
         "color": options.color,
-        "background": options.background or (BACKDROP if options.sheet and len(options.meshes) > 1 else Backdrop()),
+        "background": sheet_background(options) or Backdrop(),
         "cull": options.cull,
         "subpixel_bits": options.subpixel_bits,
         "tolerance": options.tolerance,

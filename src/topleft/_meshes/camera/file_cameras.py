@@ -14,11 +14,10 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_path, as_scale
+from topleft._core.base.arrays import as_scale
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.camera.matrices import box_matrix, frustum_matrix, tangent
-from topleft._meshes.io.limits.budget import Budget
-from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, reading
+from topleft._meshes.io.load import GLTF_SUFFIXES, as_moment, input_file, reading
 from topleft._meshes.io.references import InputFile
 from topleft.errors import MeshError
 
@@ -27,7 +26,13 @@ if TYPE_CHECKING:
 
 
 def load_cameras(
-    path: str | os.PathLike[str], *, time: float | None = None, clip: int | str | None = None, scale: float = 1.0
+    path: str | os.PathLike[str],
+    *,
+    time: float | None = None,
+    clip: int | str | None = None,
+    scale: float = 1.0,
+    root: str | os.PathLike[str] | None = None,
+    **limits: int | None,
 ) -> list[Camera]:
     r"""The cameras of a glTF or GLB file, in the order of the nodes that hold them; of other formats none.
 
@@ -39,6 +44,8 @@ def load_cameras(
         As for `load`: where an animation has the nodes of the cameras at a time.
     scale : float
         As for `load`: the cameras see the mesh that is read with it as they see the mesh of the file.
+    root, **limits
+        As for `load`: the folder whose files an animation may name, too, and `max_bytes` and its kind.
 
     Returns
     -------
@@ -54,7 +61,7 @@ def load_cameras(
         If the file is broken, or a camera of it has numbers that none can have, or there is no such animation, or it
         is a folder, JSON or text: `Camera.from_nerfstudio` and `Camera.from_colmap` are for those.
     ValueError
-        If `time` is negative, infinite or NaN, or `scale` is not positive and finite.
+        If `time` is negative, infinite or NaN, `scale` is not positive and finite, or `root` is no folder.
 
     Examples
     --------
@@ -68,7 +75,7 @@ def load_cameras(
     []
     """
     factor = as_scale(scale)
-    source = InputFile(as_path("path", path), Budget(os.fspath(path)))
+    source = input_file(path, root, **limits)
     if source.path.is_dir() or (source.path.is_file() and source.path.suffix.lower() in (".json", ".txt", ".bin")):
         raise MeshError(
             f"{str(path)!r} is no mesh with cameras: Camera.from_nerfstudio reads a frame of a transforms.json, "

@@ -144,7 +144,7 @@ def load(
     [[0, 1, 2]]
     """
     crease, scale = as_crease(crease), as_scale(scale)
-    source = _input_file(
+    source = input_file(
         path, root, max_vertices=max_vertices, max_texture_pixels=max_texture_pixels, max_triangles=max_triangles,
         max_nodes=max_nodes, max_lines=max_lines, max_bytes=max_bytes, max_unpacked_bytes=max_unpacked_bytes,
     )  # fmt: skip
@@ -159,7 +159,7 @@ def load_cells(path: str | os.PathLike[str]) -> tuple[Any, Polygons]:
     """The mesh of meshio of a file that it reads, and the triangles of its cells. Errors and warnings are of `load`."""
     from topleft._meshes.io.solvers import note_lost_views, read_cells
 
-    source = _input_file(path, None)
+    source = input_file(path, None)
     theirs, polygons = reading(source, lambda: read_cells(source, MESHIO_READERS[source.path.suffix.lower()]))
     if polygons is None:
         raise MeshError(f"{str(path)!r} has no triangles")
@@ -181,7 +181,7 @@ def clip_length(
 
     Errors are those of `load`.
     """
-    source = _input_file(path, root, **limits)
+    source = input_file(path, root, **limits)
     if source.path.suffix.lower() not in GLTF_SUFFIXES:
         return None
     from topleft._meshes.io.gltf.reader import read_length  # as late as in `_parts`
@@ -189,7 +189,7 @@ def clip_length(
     return reading(source, lambda: read_length(source, clip))
 
 
-def _input_file(path: str | os.PathLike[str], root: str | os.PathLike[str] | None, **limits: int | None) -> InputFile:
+def input_file(path: str | os.PathLike[str], root: str | os.PathLike[str] | None, **limits: int | None) -> InputFile:
     """The file of a path, its budget, and the folder whose files it may name, too."""
     checked = as_path("path", path)
     home = None if root is None else as_path("root", root)

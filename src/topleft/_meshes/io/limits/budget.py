@@ -47,6 +47,8 @@ class Budget:
 
     def __init__(self, name: str, **limits: int | None) -> None:
         for option, limit in limits.items():
+            if option not in LIMITS:
+                raise TypeError(f"limits are {', '.join(LIMITS)}, got {option!r}")
             if limit is not None and (isinstance(limit, bool) or not isinstance(limit, Integral)):
                 raise TypeError(f"{option} must be a whole number, got {shown(limit)}")
             if limit is not None and limit < 0:
