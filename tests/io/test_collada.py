@@ -338,7 +338,7 @@ def test_collada_texture_of_further_coordinates_is_told(read, tmp_path, number, 
     )
     assert node != BOUND
     _, told = read(collada(faces, node=node, more=images + effect("m", laid)))
-    assert told == ["textures laid by the first of several texture coordinates: 'U'"] * n
+    assert told == ["textures laid by the first of several texture coordinates: 'set 1 of a'"] * n
 
 
 def test_collada_normals_and_colours_of_corners_are_read(read):

@@ -164,11 +164,13 @@ def test_gltf_third_set_of_texture_coordinates_of_a_material_is_told(tmp_path):
     file.texture([[[9, 9, 9]]])
     normal, emission, color = ({"index": 0, "texCoord": number} for number in (1, 3, 2))
     file.add("materials", {
-        "pbrMetallicRoughness": {"baseColorTexture": color}, "emissiveTexture": emission, "normalTexture": normal,
+        "name": "wood", "pbrMetallicRoughness": {"baseColorTexture": color}, "emissiveTexture": emission,
+        "normalTexture": normal,
     })  # fmt: skip
     uv = {f"TEXCOORD_{k}": np.full((3, 2), k / 8, np.float32) for k in range(4)}
     (tmp_path / "a.glb").write_bytes(file.shown(material=0, **uv).glb())
-    with pytest.warns(MeshWarning, match="textures on a third set of texture coordinates of one material not read"):
+    told = "textures on a third set of texture coordinates of one material not read: 'TEXCOORD_3 of wood'"
+    with pytest.warns(MeshWarning, match=told):
         mesh = tl.load(tmp_path / "a.glb")
     assert (mesh.uv[0, 0], mesh.uv1[0, 0]) == (1 / 8, 2 / 8)
     assert mesh.materials[0].emission_texture is None

@@ -127,13 +127,12 @@ class _Collada:
             self._notes.add("geometries that are not there", instance.get("url", ""))
             return
         first = geometry.find(".//input[@semantic='TEXCOORD']")
-        for row in instance.iter("bind_vertex_input"):
-            if (
-                first is not None
-                and row.get("semantic") in self._sets
-                and row.get("input_set", "0") != first.get("set", "0")
-            ):
-                self._notes.add("textures laid by the first of several texture coordinates", row.get("semantic", ""))
+        for material in instance.iter("instance_material"):
+            for row in material.iter("bind_vertex_input"):
+                number, semantic = row.get("input_set", "0"), row.get("semantic")
+                if first is not None and semantic in self._sets and number != first.get("set", "0"):
+                    name = f"set {number} of {material.get('symbol')}"
+                    self._notes.add("textures laid by the first of several texture coordinates", name)
         targets = {row.get("symbol"): row.get("target") for row in instance.iter("instance_material")}
         budget = self._source.budget
         budget.spend("max_nodes", len(targets))

@@ -57,6 +57,7 @@ class Materials:
         if index not in self._materials:
             self._source.budget.spend("max_nodes", 1)
             self._uv_sets[index] = self._sets = uv_sets_of(row)
+            self._name = str(row.get("name") or f"materials[{index}]")
             self._materials[index] = self._made(row)
         return self._materials[index]
 
@@ -148,7 +149,8 @@ class Materials:
         transform = info.get("extensions", {}).get("KHR_texture_transform", {})
         set_of_file = whole(transform, "texCoord", whole(info, "texCoord", 0))
         if set_of_file not in self._sets:
-            self._source.notes.add("textures on a third set of texture coordinates of one material not read")
+            name = f"TEXCOORD_{set_of_file} of {self._name}"
+            self._source.notes.add("textures on a third set of texture coordinates of one material not read", name)
             return None
         uv_set = self._sets.index(set_of_file)
         matrix = None if not transform else transform_of(transform)
