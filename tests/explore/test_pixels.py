@@ -131,13 +131,18 @@ def test_page_lists_each_scene_once_in_the_order_of_its_keys():
 @pytest.mark.parametrize("name", FAILURE_SCENES)
 def test_failure_scene_shows_the_failure_and_the_exact_picture(draw, name):
     found = FAILURE_SCENES[name]
-    panels = draw(scene(name) | {"size": list(found.size), "origin": list(found.origin)})
+    whole = draw(scene(name) | {"scene": name})
+    panels = draw(scene(name) | {"scene": name, "size": list(found.size), "origin": list(found.origin)})
     wanted = picture(found.expected)
     exact = panels["exact"]["owners" if found.kind == "wrong" else "counts"]
     assert (exact == np.where(wanted < 0, -1 if found.kind == "wrong" else 0, wanted)).all()
-    x, y = panels["difference"]["pixel"]
-    drawn = [(panels[key]["owners"][y, x], panels[key]["counts"][y, x]) for key in ("a", "exact")]
-    assert drawn[0] != drawn[1]
+    for seen in (panels, whole):
+        x, y = seen["difference"]["pixel"]
+        (owner, count), (exact_owner, exact_count) = (
+            (seen[key]["owners"][y, x], seen[key]["counts"][y, x]) for key in ("a", "exact")
+        )
+        fails = {"gap": count < exact_count, "overdraw": count > exact_count, "wrong": owner != exact_owner}
+        assert fails[found.kind]
 
 
 def test_pixel_that_differs_is_the_nearest_to_the_middle(page, draw):
@@ -156,6 +161,7 @@ def test_pixel_that_differs_is_the_nearest_to_the_middle(page, draw):
     [
         (SQUARE, "64 pixels drawn"),
         (SQUARE | {"exact": True}, "64 pixels drawn, all exact"),
+        ({"vertices": [[1, 1], [2, 1], [1, 2.1]], "triangles": [[0, 1, 2]], "size": [4, 4]}, "1 pixel drawn"),
         (SQUARE | {"triangles": [[0, 1, 2], [1, 3, 2], [0, 1, 2]]}, "64 pixels drawn: 28 once, 36 more often"),
         (scene("shared-edge") | {"method": "bresenham_scanline"},
          "110 pixels drawn: 64 exact, 20 too many, 26 drawn too often"),

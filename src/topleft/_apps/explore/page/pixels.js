@@ -117,7 +117,7 @@ function described({counts, notes, seconds}, {look}) {
 // Counts the pixels of a drawing: numbers before the semicolon add up. `kinds` are its differences from the exact drawing.
 function sentenceOfPixels({counts, shares}, kinds) {
   const isDrawn = (_, i) => shares[i] > 0, often = tally(counts.filter(isDrawn).map((n) => Math.min(n, 2)), 3), n = sumOf(often, 0);
-  const start = `${grouped(n)} pixels drawn`, title = "drawn for at least one triangle";
+  const start = `${grouped(n)} ${n === 1 ? "pixel" : "pixels"} drawn`, title = "drawn for at least one triangle";
   if (!kinds) return [often[2] ? `${start}: ${countsOf(often, ["", "once", "more often"])}` : start, "n", title];
   const drawn = tally(kinds.filter(isDrawn)), n_missing = tally(kinds)[3] - drawn[3];
   if (drawn[1] === n && !n_missing) return [`${start}, all exact`, "good", BESIDE_EXACT];
@@ -125,12 +125,17 @@ function sentenceOfPixels({counts, shares}, kinds) {
   return [`${start}${words && ": "}${words}${n_missing ? `; ${grouped(n_missing)} missing` : ""}`, "bad", BESIDE_EXACT];
 }
 
-// The pixel nearest to the middle of those that differ, [x, y]; null where none does.
-function nearestDifference(kinds, [width, height]) {
-  let nearest = null, least = Infinity;
+// Differences that are the failure of a failure scene, by the word in its name.
+const FAILURES = {gap: [3], overdraw: [2, 5], wrong: [2, 3, 4]};
+
+// The pixel nearest to the middle of those that differ, if there are such in the way that a failure scene is about, [x, y]; null
+// where none does.
+function nearestDifference(kinds, {size: [width, height], scene = ""}) {
+  const wanted = FAILURES[/-(gap|overdraw|wrong)(-|$)/.exec(scene)?.[1]] ?? [];
+  let nearest = null, least = [Infinity, Infinity];
   for (const [i, kind] of kinds.entries()) {
-    const x = i % width, y = Math.floor(i / width), far = Math.hypot(x - (width >> 1), y - (height >> 1));
-    if (kind > 1 && far < least) [nearest, least] = [[x, y], far];
+    const x = i % width, y = Math.floor(i / width), far = [wanted.includes(kind) ? 0 : 1, Math.hypot(x - (width >> 1), y - (height >> 1))];
+    if (kind > 1 && (far[0] - least[0] || far[1] - least[1]) < 0) [nearest, least] = [[x, y], far];
   }
   return nearest;
 }
@@ -174,7 +179,7 @@ export async function drawPixels(line, hello, given) {
     const pair = drawn.slice(0, 2), kinds = differenceOf(...pair.map((key) => drawings[key]));
     panels.push({
       ...panelOf("difference", "difference"), ...compared(tally(kinds), pair.map((key) => names[key])),
-      picture: painted(size, (i) => DIFFERENCES[kinds[i]]), pixel: nearestDifference(kinds, size),
+      picture: painted(size, (i) => DIFFERENCES[kinds[i]]), pixel: nearestDifference(kinds, state),
     });
   }
   return {panels, samples: isCoverage(state) ? [] : hello.samples[state.n_samples].map((at) => at.map((x) => 0.5 + x / 16))};
