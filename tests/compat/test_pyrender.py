@@ -136,7 +136,7 @@ def test_colors_are_read_as_pyrender_reads_them(given, expected):
     assert_same(material.baseColorFactor[:3], expected)
 
 
-@pytest.mark.parametrize("given", [[], np.zeros((2, 3)), np.zeros((2, 2, 3))])
+@pytest.mark.parametrize("given", [[], [0.5], np.array([[7]]), np.zeros((2, 3)), np.zeros((2, 2, 3))])
 def test_what_is_no_color_is_refused(given):
     with pytest.raises(ValueError, match=r"color must have shape \(3,\)"):
         pr.DirectionalLight(color=given)

@@ -288,10 +288,13 @@ class SceneFragments(InstanceIds, Fragments):
     def distance(self, camera: Viewer) -> NDArray[np.float32]:
         """Return the distance of each pixel along the view, as `Fragments.distance` does."""
         view = view_of(camera)
-        rows = [engine.product(view[2], instance.transform) for instance in self.whole]
-        meshes = [instance.mesh for instance in self.whole]
-        values = [-(engine.product(mesh.vertices, row[:3]) + row[3]) for mesh, row in zip(meshes, rows, strict=True)]
-        return self._interpolated(values, np.inf)
+
+        def distances(part: VisiblePart) -> NDArray[np.float32]:
+            instance = self.whole[part.i]
+            row = engine.product(view[2], instance.transform)
+            return part.interpolate(-(engine.product(instance.mesh.vertices, row[:3]) + row[3]), np.inf)
+
+        return join(self.parts, self.id.shape, np.inf, distances)
 
     def _checked(self, values: Any) -> list[NDArray[Any]]:
         n = len(self.whole)

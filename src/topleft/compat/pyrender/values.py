@@ -98,13 +98,13 @@ def as_vector(name: str, value: Any, n: int) -> F64:
 
 def as_rgb(name: str, value: Any, n: int) -> F64:
     """A colour of n floats, as pyrender reads it: integers are divided by 255, missing numbers are 1."""
-    array = np.squeeze(np.asarray([] if value is None else value))
-    array = array.astype(np.float64) / (255.0 if array.dtype.kind in "iu" else 1.0)
-    if array.ndim == 0:
+    given = np.asarray([] if value is None else value)
+    array = np.squeeze(given).astype(np.float64) / (255.0 if given.dtype.kind in "iu" else 1.0)
+    if given.ndim == 0:
         array = np.repeat(array, n)
     elif array.ndim == 1 and len(array):
         array = np.append(array, np.ones(n))[:n]
-    return as_vector(name, array, n)
+    return as_vector(name, array if array.ndim else given, n)
 
 
 class Color(Checked):
