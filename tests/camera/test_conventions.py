@@ -342,6 +342,10 @@ FILE = {"fl_x": 5, "w": 4, "h": 4, "frames": [FRAME]}
         (lambda: Camera.from_nerfstudio(FILE | {"w": 4.5}), TypeError, r"size \(w and h of the file\) .*4.5"),
         (lambda: Camera.from_nerfstudio({"fl_x": 5, "w": 4, "h": 4, "k4": 0.1, "frames": [FRAME]}), ValueError,
          "k4 of a camera_model OPENCV must be 0, got 0.1"),
+        (lambda: Camera.from_nerfstudio(FILE | {"k5": 0.1}), ValueError, "k5 of a camera_model OPENCV.* must be 0"),
+        (lambda: Camera.from_nerfstudio(FILE | {"is_fisheye": True, "k6": 0.1}), ValueError, "k6 of a camera_model"),
+        (lambda: Camera.from_nerfstudio(FILE | {"rolling_shutter": [0, 0, 0.1, 0]}), ValueError,
+         r"rolling_shutter must be 0, got \[0, 0, 0.1, 0\]"),
         (
             lambda: Camera.from_nerfstudio(
                 {"fl_x": 5, "w": 4, "h": 4, "p1": 0.1, "camera_model": "OPENCV_FISHEYE", "frames": [FRAME]}

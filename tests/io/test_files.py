@@ -275,3 +275,33 @@ def test_load_by_meshio_prints_nothing(write, capfd):
     with pytest.raises(MeshError):
         files.load(write("b.msh", b"$MeshFormat\n9 0 8\n"))
     assert capfd.readouterr() == ("", "")
+
+
+CORNERS = "0 0 0\n1 0 0\n0 1 0\n"
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n{}"
+    "element face {}\nproperty list uchar int vertex_indices\nend_header\n{}"
+)
+SMALL_FACES = "faces of fewer than three corners not drawn"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", SMALL_FACES),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\ncall b.obj\n", "files that it calls not read"),
+        ("a.off", f"OFF\n3 2 0\n{CORNERS}3 0 1 2\n2 0 1\n", SMALL_FACES),
+        ("a.ply", PLY.format("", 2, f"{CORNERS}3 0 1 2\n2 0 1\n"), SMALL_FACES),
+        ("a.ply", PLY.format("", 1, f"{CORNERS}3 0 1 2\n3 0 1 2\n"), "content after the last row that its header"),
+        ("a.ply", PLY.format("property uchar red\n", 1, CORNERS.replace("\n", " 7\n") + "3 0 1 2\n"),
+         "properties of vertex not read: 'red'"),
+        ("a.ply", PLY.format("".join(f"property float {one}\n" for one in ("s", "t", "u", "v")), 1,
+                             CORNERS.replace("\n", " 0 0 0 0\n") + "3 0 1 2\n"),
+         "properties of vertex not read: 's', 't'"),
+        ("a.stl", bytes(80) + (1).to_bytes(4, "little") + bytes(50) * 2, "bytes after the last triangle"),
+    ],
+)  # fmt: skip
+def test_load_tells_what_it_leaves_out(tmp_path, name, content, told):
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.warns(MeshWarning, match=told):
+        tl.load(tmp_path / name)

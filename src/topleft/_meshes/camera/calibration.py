@@ -168,8 +168,11 @@ def of_nerfstudio(transforms: Any, i: int, size: object) -> Calibration:
         if p1 or p2:
             raise ValueError(f"p1 and p2 of an OPENCV_FISHEYE camera must be 0, got {p1} and {p2}")
         lens = {"fisheye": [k1, k2, k3, k4]}
-    elif k4:
-        raise ValueError(f"k4 of a camera_model {model} must be 0, got {k4}: no lens of a perspective camera has it")
+    for key in ("k5", "k6") if "fisheye" in lens else ("k4", "k5", "k6"):
+        if known.get(key):
+            raise ValueError(f"{key} of a camera_model {model} must be 0, got {known[key]!r}: its lens has none")
+    if np.any(known.get("rolling_shutter", 0.0)):
+        raise ValueError(f"rolling_shutter must be 0, got {known['rolling_shutter']!r}: a picture is of one moment")
     return Calibration(matrix_of(fx, fy, cx, cy), pose, (width, height), **lens)
 
 

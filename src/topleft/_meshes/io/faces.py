@@ -14,6 +14,12 @@ from topleft._meshes.model.polygons import triangulate
 from topleft.errors import MeshError
 
 
+def note_small_faces(source: InputFile, n_corners: I64) -> None:
+    """Note faces that have no triangle."""
+    if len(n_corners) and int(n_corners.min()) < 3:
+        source.notes.add("faces of fewer than three corners not drawn")
+
+
 def mesh_of_faces(
     source: InputFile, positions: Array, corners: I64, n_corners: I64, *, normals: Array | None, colors: Array | None,
     uv: Array | None, uv_of_corners: Array | None = None, colors_of_faces: Array | None = None,
@@ -22,6 +28,7 @@ def mesh_of_faces(
     if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < len(positions):
         bad = int(corners.min()) if int(corners.min()) < 0 else int(corners.max())
         raise MeshError(f"a face names vertex {bad} of {len(positions)}")
+    note_small_faces(source, n_corners)
     triangles, faces = triangulate(positions, corners, n_corners)
     if not len(triangles):
         return None

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from topleft._core.base.array_types import F64, I64, U8
+from topleft._meshes.io.faces import note_small_faces
 from topleft._meshes.io.mtl import read_mtl
 from topleft._meshes.io.references import Cloud, InputFile, numbers_of_text, utf8_of
 from topleft._meshes.model.material import Material
@@ -31,6 +32,7 @@ UNREAD = {
     b"p": "points not drawn",
     b"curv": "curves not drawn",
     b"surf": "free-form surfaces not drawn",
+    b"call": "files that it calls not read",
 }
 
 
@@ -52,6 +54,7 @@ def read_obj(source: InputFile) -> list[Mesh]:
         return []
     source.budget.spend("max_triangles", int(np.maximum(n_corners - 2, 0).sum()))
     materials, row_of_face = _materials(text, source)
+    note_small_faces(source, n_corners)
     triangles, faces = triangulate(positions, corners[:, 0], n_corners)
     rows = None if row_of_face is None else row_of_face[faces]
     if rows is not None and len(uv):

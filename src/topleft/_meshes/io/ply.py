@@ -44,10 +44,13 @@ COLOR_NAMES = (
     ("red", "green", "blue", "alpha"), ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
     ("r", "g", "b", "a"), ("color_red", "color_green", "color_blue", "color_alpha"),
 )  # fmt: skip
-READ_NAMES = {"x", "y", "z", "vertex_indices", "vertex_index", "texcoord", "alpha"}.union(
-    *UV_NAMES, *NORMAL_NAMES, *COLOR_NAMES
-)
-"""Properties of vertices and faces that are read."""
+LEFT_OVER = "content after the last row that its header counts not read"
+
+COLUMNS = {
+    "vertex": (("x", "y", "z"), UV_NAMES, NORMAL_NAMES, COLOR_NAMES),
+    "face": (("vertex_indices", "vertex_index", "texcoord"), (), (), COLOR_NAMES),
+}
+"""Properties that are read, and choices of such, of which the first that is whole is read."""
 
 
 @dataclass
@@ -117,9 +120,8 @@ def read_ply(source: InputFile) -> list[Mesh]:
             source.budget.spend("max_vertices", element.n)
         elif element.n and element.name not in ("face", "tristrips", "camera", "obj_info"):
             source.notes.add(*("lines not drawn",) if element.name == "edge" else ("elements not read", element.name))
-        for prop in element.properties if element.n and element.name in ("vertex", "face") else ():
-            if prop.name not in READ_NAMES:
-                source.notes.add(f"properties of {element.name} not read", prop.name)
+        for name in _unread(element) if element.n and element.name in COLUMNS else ():
+            source.notes.add(f"properties of {element.name} not read", name)
         source.budget.spend("max_lines", min(element.n, len(content)))
     found = _found(content, order, elements, start, source)
     vertex = found.get("vertex")
@@ -137,11 +139,26 @@ def read_ply(source: InputFile) -> list[Mesh]:
     return [] if mesh is None else [_textured(mesh, textures, source)]
 
 
+def _unread(element: _Element) -> list[str]:
+    """The names of the properties of vertices or faces that are not read."""
+    names = [prop.name for prop in element.properties]
+    plain, uv, normals, colors = COLUMNS[element.name]
+    read = set(plain)
+    for choices in (uv, normals):
+        read.update(next((choice for choice in choices if set(choice) <= set(names)), ()))
+    color = next((choice for choice in colors if set(choice[:3]) <= set(names)), ())
+    read.update((*color, "alpha") if color else ())
+    return [name for name in names if name not in read]
+
+
 def _found(content: bytes, order: str, elements: list[_Element], start: int, source: InputFile) -> dict[str, Rows]:
     """The elements by name."""
     if order:
         body = _Body(np.frombuffer(content, np.uint8), start)
-        return {element.name: body.rows(element.stored(order)) for element in elements}
+        stored = {element.name: body.rows(element.stored(order)) for element in elements}
+        if body.n_left:
+            source.notes.add(LEFT_OVER)
+        return stored
     body = _Body(numbers_of_text(content[start:]))
     error: MeshError | None = None
     found: dict[str, Rows] = {}
@@ -160,6 +177,8 @@ def _found(content: bytes, order: str, elements: list[_Element], start: int, sou
         source.notes.add("rows with more numbers than the header says, which are not read")
     elif error is not None:
         raise error
+    else:
+        source.notes.add(LEFT_OVER)
     return found
 
 

@@ -36,6 +36,8 @@ def read_stl(source: InputFile) -> list[Mesh]:
         corners = _corners_of_text(content)
     else:
         rows = np.frombuffer(content, ROWS, n, N_HEADER_BYTES)
+        if len(content) > N_HEADER_BYTES + N_TRIANGLE_BYTES * n:
+            source.notes.add("bytes after the last triangle that its header counts not read")
         corners, colors = rows["corners"].reshape(-1, 3), _stl_colors(rows["color"], content[:N_HEADER_BYTES])
     source.budget.spend("max_vertices", len(corners))
     source.budget.spend("max_triangles", len(corners) // 3)
