@@ -105,12 +105,14 @@ def test_gltf_mirrored_node_keeps_the_outside(load):
     assert found.normals[:, 2].tolist() == [1, 1, 1]
 
 
-def test_gltf_shows_the_scene_that_it_names(load):
+def test_gltf_shows_the_scene_that_it_names_and_tells_of_others(tmp_path):
     file = GltfFile(scenes=[{"nodes": [0]}, {"nodes": [1]}], scene=1)
     mesh = file.mesh(file.primitive())
-    file.node(mesh=mesh)
+    file.node(mesh=mesh, name="old")
     file.node(mesh=mesh, translation=[5, 0, 0])
-    assert load(file).bounds[:, 0].tolist() == [5, 6]
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with pytest.warns(MeshWarning, match="nodes outside of its scene not drawn: 'old'"):
+        assert tl.load(tmp_path / "a.glb").bounds[:, 0].tolist() == [5, 6]
 
 
 @pytest.mark.parametrize("nodes", [[[1], [0]], [[0]], [[1, 1], []]])
@@ -174,6 +176,23 @@ def test_gltf_third_set_of_texture_coordinates_of_a_material_is_told(tmp_path):
         mesh = tl.load(tmp_path / "a.glb")
     assert (mesh.uv[0, 0], mesh.uv1[0, 0]) == (1 / 8, 2 / 8)
     assert mesh.materials[0].emission_texture is None
+
+
+def test_gltf_tells_the_meshes_that_it_does_not_place(tmp_path):
+    file = GltfFile().shown()
+    file.tree["nodes"].append({"mesh": 0, "name": "spare"})
+    file.tree["scenes"] = [{"nodes": [0]}]
+    file.tree["meshes"][0]["primitives"].append({"attributes": {}})
+    file.tree["meshes"].append({"primitives": []})
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert len(tl.load(tmp_path / "a.glb").triangles) == 1
+    assert [str(one.message).split(": ", 1)[1] for one in told] == [
+        "nodes outside of its scene not drawn: 'spare'",
+        "meshes that no node places not drawn: 'meshes[1]'",
+        "triangles without positions not drawn",
+    ]
 
 
 UNREAD = [

@@ -278,6 +278,11 @@ class _Reader:
         """The primitives of all nodes, placed."""
         nodes = {i: entry(self._tree, "nodes", i) for i in self._nodes.shown()}
         meshes = [node["mesh"] for node in nodes.values() if "mesh" in node]
+        elsewhere = [node for i, node in enumerate(self._tree.get("nodes", ())) if "mesh" in node and i not in nodes]
+        for node in elsewhere:
+            self._source.notes.add("nodes outside of its scene not drawn", str(node.get("name", "")))
+        for i in sorted(set(range(len(self._tree.get("meshes", ())))) - {*meshes, *(one["mesh"] for one in elsewhere)}):
+            self._source.notes.add("meshes that no node places not drawn", f"meshes[{i}]")
         sizes = {mesh: len(entry(self._tree, "meshes", mesh)["primitives"]) for mesh in meshes}
         # Reading a primitive takes as long as placing it: too many are refused before the first is read.
         self._source.budget.check("max_nodes", sum(sizes.values()) + sum(sizes[mesh] for mesh in meshes))
@@ -368,6 +373,7 @@ class _Reader:
             self._source.notes.add("points not drawn" if mode == POINTS else "lines not drawn")
             return None
         if "POSITION" not in attributes:
+            self._source.notes.add("triangles without positions not drawn")
             return None
         uv_sets = (0, 1) if primitive.get("material") is None else self._materials.uv_sets(primitive["material"])
         values, corners = self._arrays(primitive, attributes, uv_sets)
