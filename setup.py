@@ -54,7 +54,7 @@ FLAGS_C = [
 ]  # fmt: skip
 # Cython's output is not ours to clean: it has the usual harmless findings of generated code. It converts arguments; -O2
 # takes twice the time to compile for no call that is measurably faster; -Og saves a third of it, and costs the smallest
-# calls 5 %.
+# calls 5 %. Python's limited API, one wheel for every Python from 3.11 on, costs them 4 to 16 % (Zen 3, Cython 3.3.1).
 FLAGS_CYTHON = [
     "-O1", "-g0", "-ffp-contract=off", "-fno-fast-math", "-fvisibility=hidden", "-fno-lto",
     "-Wno-unused-function", "-Wno-unused-parameter", "-Wno-missing-field-initializers", "-Wno-cast-function-type",
