@@ -24,7 +24,7 @@ PAGE = ROOT / "src/topleft/_apps/explore/page"
 COMPILER = "clang --target=wasm32-wasi --sysroot=/usr"
 FLAGS = [
     "-std=c11", "-O3", "-DNDEBUG", f"-I{ROOT / 'csrc'}", f"-I{CLASSICS}", "-ffp-contract=off", "-fno-fast-math",
-    "-fno-math-errno", "-fvisibility=hidden", "-msimd128", "-Wall", "-Wextra", "-Werror",
+    "-fno-math-errno", "-fvisibility=hidden", "-msimd128", "-Wall", "-Wextra", "-Wno-unused-function", "-Werror",
 ]  # fmt: skip
 LINKED = ["-nostartfiles", "-Wl,--no-entry", "-Wl,--gc-sections", "-Wl,-s", "-Wl,-z,stack-size=1048576"]
 

@@ -1,9 +1,11 @@
 /* The kernels as a module of WebAssembly, for the page that runs without Python: memory, a scene, and pictures of it.
  * In: arrays that the page has written into memory of `web_room`.  Out: buffers there.  Every picture is drawn by the
- * table of kernels that Python calls; what stands here is what the verbs of topleft._core.raster do between two of its
- * calls.  The module has one scene and one caller; it imports nothing. */
-#include "isa_simd128.c"
-#define K tl_kernels_simd128
+ * kernels that Python calls; what stands here is what the verbs of topleft._core.raster do between two calls.  All of
+ * them are in one unit: no other is compiled.  The module has one scene and one caller; it imports nothing. */
+#define TL_USE_SIMD128
+#define TL_UNIT raster
+#define TL_ISA web
+#include "unit_raster.c"
 
 #define WEB_EXPORT(name) __attribute__((export_name(#name)))
 #define WEB_FULL -2 /* no memory is left */
@@ -84,9 +86,9 @@ int web_take_pixels(double *points, int n_components, int n, const int32_t *tria
     tl_wide *wide = cleared_room((size_t)n * sizeof *wide);
     if (!vertices || !wide)
         return WEB_FULL;
-    const tl_vertex_counts counts = K.snap(&scene.source, 0, n, grid_bits, n_components == 3, vertices, wide);
+    const tl_vertex_counts counts = snap(&scene.source, 0, n, grid_bits, n_components == 3, vertices, wide);
     mesh->vertices = vertices, mesh->wide = counts.n_wide ? wide : NULL;
-    return counts.n_bad ? (int)K.first_bad(vertices, n, triangles, n_triangles) : -1;
+    return counts.n_bad ? (int)first_bad(vertices, n, triangles, n_triangles) : -1;
 }
 
 /* The part of the picture that is drawn, and which test covers a pixel. */
@@ -116,7 +118,7 @@ WEB_EXPORT(web_draw) int web_draw(int sink, int x, int y, void *pixels, float *d
         seen.mesh.sample_y_fx = y * (1 << (window->subpixel_bits - 4));
     tl_exact_counts counts = {0};
     tl_slice slice = {.end = seen.n_triangles, .is_first = 1, .is_last = 1, .counts = &counts};
-    K.draw_mesh(&seen, window, &target, &slice);
+    draw_mesh(&seen, window, &target, &slice);
     used = before;
     return 0;
 }
@@ -133,10 +135,10 @@ WEB_EXPORT(web_area) int web_area(float *pixels, int is_clamped)
         ((int32_t *)cells)[i] = TL_CELL_CLEAR;
     const tl_slice all = {.end = scene.snapped.n_triangles};
     tl_area area = {.pixels = pixels, .stride_px = scene.window.width, .cells = cells, .is_clamped = is_clamped};
-    if (K.draw_area(&scene.snapped, &scene.window, &all, &area) == TL_AREA_OVERFLOW) {
+    if (draw_area(&scene.snapped, &scene.window, &all, &area) == TL_AREA_OVERFLOW) {
         memset(cells, 0, 8 * n);
         area.is_wide = 1;
-        K.draw_area(&scene.snapped, &scene.window, &all, &area);
+        draw_area(&scene.snapped, &scene.window, &all, &area);
     }
     used = before;
     return 0;
@@ -153,11 +155,11 @@ WEB_EXPORT(web_wireframe) int web_wireframe(uint8_t *pixels)
     if (!scratch.starts || !scratch.last_low || !scratch.highs || !edges)
         return WEB_FULL;
     int64_t n_edges = 0;
-    K.list_edges(&scene.snapped, &scratch, edges, &n_edges);
+    list_edges(&scene.snapped, &scratch, edges, &n_edges);
     const tl_edges lines = {.mesh = scene.snapped.mesh, .edges = (const int32_t *)edges, .n_edges = n_edges};
     const tl_line_target target = {.pixels = pixels, .stride_px = scene.window.width};
     memset(pixels, 0, (size_t)(scene.window.width * scene.window.height));
-    K.draw_lines(&lines, &scene.window, &target);
+    draw_lines(&lines, &scene.window, &target);
     used = before;
     return 0;
 }
