@@ -68,8 +68,8 @@ def twenty_thousand(seed):
     yield mixed(np.random.default_rng(seed), 20_000, (480, 270), **MIXED[seed]), DEPTH_TESTS
 
 
-@ON_EACH_ISA
 @one_by_one("seed", MIXED)
+@ON_EACH_ISA
 def test_engine_mixed_triangles_equal_exact_picture(seed, isa):
     check_all(isa, cases(twenty_thousand, seed), (1, 3))
 
@@ -176,8 +176,8 @@ def limits_of(bits):
     yield with_extents(rng, extents_at_limits(rng, bits), (150, 90), bits), DEPTH_TESTS
 
 
-@ON_EACH_ISA
 @BITS
+@ON_EACH_ISA
 def test_engine_extents_at_limits_equal_exact_picture(bits, isa):
     check_all(isa, cases(limits_of, bits), (1, 8))
 
@@ -216,15 +216,15 @@ def windows_at(edge_px, bits):
             yield Scene(vertices, scene.triangles, size, scene.view), DEPTH_TESTS
 
 
-@ON_EACH_ISA
 @BITS
+@ON_EACH_ISA
 def test_engine_vertices_at_the_end_of_64_bits_equal_exact_picture(bits, isa):
     check_all(isa, cases(windows_at, 2**30 >> bits, bits))
 
 
-@ON_EACH_ISA
 @one_by_one("bits", [0, 8, 16])
 @pytest.mark.parametrize("edge_px", [2**15, 2**22, 2**30, 2**31])
+@ON_EACH_ISA
 def test_engine_windows_at_limits_equal_exact_picture(edge_px, bits, isa):
     check_all(isa, cases(windows_at, edge_px, bits))
 

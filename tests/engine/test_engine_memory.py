@@ -4,13 +4,14 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, Expected, cases, check, check_all, mixed, on, plain
+from engine_cases import DEPTH_TESTS, ON_EACH_ISA, THREADS, Expected, cases, check_all, mixed, on, plain
 from pages import before_a_page, behind_a_page
 from strategies import Scene, perspective, soup
 
@@ -18,6 +19,7 @@ import topleft as tl
 from topleft.methods import reference as ref
 
 N_MAX = 70  # more than four vectors of the widest instruction set
+N_LANES = {"scalar": 1, "simd128": 4, "avx2": 8, "avx512": 16}
 
 # ---- tails of vectors -----------------------------------------------------------------------------------------------
 
@@ -99,7 +101,9 @@ def draw_all(scene, guard):
 
 def check_page_ends():
     """Pictures from arrays between inaccessible pages are the usual ones; a stray access ends the process."""
-    tails = [*range(36), *range(62, N_MAX + 1)]  # each of up to two vectors of 16, and round four
+    n_lanes = N_LANES[tl.build_info()["isa"]]
+    # Each tail of up to two vectors, round four, and round 64.
+    tails = sorted({*range(2 * n_lanes + 4), *range(4 * n_lanes - 1, 4 * n_lanes + 2), *range(62, N_MAX + 1)})
     for kind, n in product(KINDS, tails):
         print(f"{kind} {n}", flush=True)
         scene = few_vertices(kind, n, size=(1 + n, 1 + n % 7))
@@ -168,9 +172,10 @@ def limit_kinds(seed, n=40, size=(15, 11)):
     return soup(xyz.reshape(-1, 3), size, subpixel_bits=bits, origin=tuple(origin.tolist()))
 
 
-@ON_EACH_ISA
-@pytest.mark.parametrize("make", [clip_kinds, pixel_kinds, limit_kinds])
-def test_engine_vectors_of_special_vertices_equal_reference(make, isa):
+@cache
+def special(make):
+    """Scenes, each with counts and painted ids of the reference; the others are plain."""
+    made = []
     for seed in range(4):
         scene = make(seed)
         painted = plain(scene, None)
@@ -178,7 +183,14 @@ def test_engine_vectors_of_special_vertices_equal_reference(make, isa):
         counts = ref.overdraw(*scene.arrays, **scene.view)
         seen = {test: plain(scene, test) for test in DEPTH_TESTS}
         ids, depth = ({test: getattr(f, name) for test, f in seen.items()} for name in ("triangle", "depth"))
-        check(isa, scene, Expected(counts, ids, depth), (1, 3))
+        made.append((scene, Expected(counts, ids, depth)))
+    return made
+
+
+@ON_EACH_ISA
+@pytest.mark.parametrize("make", [clip_kinds, pixel_kinds, limit_kinds])
+def test_engine_vectors_of_special_vertices_equal_reference(make, isa):
+    check_all(isa, special(make), (1, 3))
 
 
 @ON_EACH_ISA

@@ -2,8 +2,15 @@
 
 import ctypes
 import mmap
+from functools import cache
 
 import numpy as np
+
+
+@cache
+def protect():
+    """The function of the system, found once: arrays come by the ten thousand."""
+    return ctypes.CDLL(None).mprotect
 
 
 def between_pages(array, start):
@@ -12,7 +19,7 @@ def between_pages(array, start):
     memory = mmap.mmap(-1, n_bytes + 2 * page)
     address = ctypes.addressof(ctypes.c_char.from_buffer(memory))
     for first in (address, address + page + n_bytes):
-        assert ctypes.CDLL(None).mprotect(ctypes.c_void_p(first), ctypes.c_size_t(page), 0) == 0
+        assert protect()(ctypes.c_void_p(first), ctypes.c_size_t(page), 0) == 0
     copy = np.frombuffer(memory, array.dtype, array.size, page + start).reshape(array.shape)
     copy[...] = array
     return copy
