@@ -216,7 +216,7 @@ CALLS = {
     "Camera.clip_from_eye": (CAMERA.clip_from_eye, {"size": SIZE}),
     "OpenCVLens.distort": (tl.OpenCVLens(k1=0.1).distort, {"points": POINTS}),
     "FisheyeLens.distort": (tl.FisheyeLens(0.1).distort, {"points": POINTS}),
-    "ViewLayers.save": (VIEWS.save, {"path": "layers.npz", "layer": None, "scale": None}),
+    "ViewLayers.save": (VIEWS.save, {"path": "layers.npz", "layer": None, "depth_scale": 0.1}),
     "Levels.save": (LEVELS.save, {"path": "levels.npz"}),
     "Levels.load": (tl.Levels.load, {"path": "nothing.npz", "mesh": CUBE}),
     "Tiles.read": (RASTER.read, {"x": 0, "y": 0, "width": 2, "height": 2}),

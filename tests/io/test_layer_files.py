@@ -68,7 +68,7 @@ def test_save_layers_mask_is_0_and_255(layers, tmp_path, suffix):
 
 
 def test_save_layers_png_ids_are_exact(layers, tmp_path):
-    (path,) = save_layers(tmp_path / "a.png", {"triangle": layers["triangle"]}, scale=7)
+    (path,) = save_layers(tmp_path / "a.png", {"triangle": layers["triangle"]}, depth_scale=7)
     numbers, _, nothing = numbers_of(path)
     assert np.array_equal(numbers, layers["triangle"])
     assert np.array_equal(nothing, layers["triangle"] < 0)
@@ -91,7 +91,7 @@ def test_save_layers_png_distance_is_in_millimetres(layers, tmp_path):
         assert image.text["topleft:scale"] == "0.001"
     assert np.array_equal(got, np.rint(np.where(np.isfinite(distance), distance, 0).astype(float) * 1000))
     assert got.max() > 1000
-    save_layers(path, {"distance": distance}, scale=5000)
+    save_layers(path, {"distance": distance}, depth_scale=1 / 5000)
     numbers, scale, nothing = numbers_of(path)
     assert scale == 1 / 5000
     assert abs(numbers - distance)[~nothing].max() <= 0.5 * scale + 1e-12
@@ -162,7 +162,8 @@ def test_view_layers_save_writes_all_or_one(tmp_path):
     found.save(tmp_path / "b.npz", "depth")
     with np.load(tmp_path / "b.npz") as file:
         assert list(file) == ["depth"]
-    found.save(tmp_path / "b.png", "depth", scale=10)
+    far = ViewLayers({"distance": np.ones((2, 2), np.float32)})
+    far.save(tmp_path / "b.png", "distance", depth_scale=0.1)
     assert np.asarray(Image.open(tmp_path / "b.png")).tolist() == [[10, 10], [10, 10]]
     with pytest.raises(ValueError, match="layer must be one of depth, alpha, got 'uv'"):
         found.save(tmp_path / "a.png", "uv")

@@ -50,7 +50,6 @@ def save_layers(
     destination: str | os.PathLike[str],
     layers: Mapping[str, Array],
     *,
-    scale: float | None = None,
     depth_scale: float = MILLIMETRE,
     matrix: npt.NDArray[np.float64] | None = None,
     background: tuple[int, int, int] = (255, 255, 255),
@@ -71,8 +70,6 @@ def save_layers(
           0 to 1, as 1 to 65535; others from the least, 1, to the greatest, 65535.
         * .jpg, .webp: pictures and masks.
     layers : mapping of str to ndarray
-    scale : float, optional
-        Steps a unit for numbers in PNG that are no ids, instead of these.
     depth_scale : float
         Units of a step of distances in PNG.
     matrix : (4, 4) float64, optional
@@ -84,24 +81,20 @@ def save_layers(
         A note for `read_record`.
     """
     place = as_location("path", destination)
-    if scale is not None:
-        scale = as_number("scale", scale)
-        if not 0 < scale < np.inf:
-            raise ValueError(f"scale must be positive and finite, got {scale}")
+    if not 0 < as_number("depth_scale", depth_scale) < np.inf:
+        raise ValueError(f"depth_scale must be positive and finite, got {depth_scale}")
     paths = layer_paths(place, list(layers))
     if place.suffix.lower() == ".npz" and "{layer}" not in str(place):
         write_image(place, layers if matrix is None else {**layers, "clip_from_world": matrix}, record=record)
         return (place,)
     # All are converted before the first is written: a layer that does not fit leaves no file.
-    stored = {name: _stored(paths[name], name, array, scale, depth_scale) for name, array in layers.items()}
+    stored = {name: _stored(paths[name], name, array, depth_scale) for name, array in layers.items()}
     for name, (array, text) in stored.items():
         write_image(paths[name], array, background=background, text=text, record=record)
     return tuple(paths.values())
 
 
-def _stored(
-    path: Location, name: str, array: Array, scale: float | None, depth_scale: float
-) -> tuple[Array, dict[str, str] | None]:
+def _stored(path: Location, name: str, array: Array, depth_scale: float) -> tuple[Array, dict[str, str] | None]:
     """The array as the file holds it, and notes on its scale."""
     suffix = path.suffix.lower()
     if suffix in (".npy", ".npz") or array.dtype == np.uint8:
@@ -115,7 +108,7 @@ def _stored(
         step = (high - low) / 255
         return np.rint((array - low) / step).clip(0, 255).astype(np.uint8), _notes(name, step, low)
     if suffix == ".png" and array.ndim == 2 and array.size:
-        return _numbers_of_16_bits(path, name, array, scale, depth_scale)
+        return _numbers_of_16_bits(path, name, array, depth_scale)
     raise ImageError(
         f"cannot write {str(path)!r}: {path.suffix} cannot hold the layer {name!r}, {array.dtype} {array.shape}; "
         "take .npz or .tiff"
@@ -123,7 +116,7 @@ def _stored(
 
 
 def _numbers_of_16_bits(
-    path: Location, name: str, array: Array, scale: float | None, depth_scale: float
+    path: Location, name: str, array: Array, depth_scale: float
 ) -> tuple[npt.NDArray[np.uint16], dict[str, str]]:
     """Numbers in equal steps; 0 where they are not finite, or ids that are -1."""
     if array.dtype == np.int32:
@@ -131,8 +124,8 @@ def _numbers_of_16_bits(
         return (array + 1).astype(np.uint16), _notes(name, 1, -1)
     is_there = np.isfinite(array)
     numbers = array[is_there].astype(np.float64)
-    if scale is not None or name in LENGTHS:
-        step, offset = depth_scale if scale is None else 1 / scale, 0.0
+    if name in LENGTHS:
+        step, offset = depth_scale, 0.0
         steps = np.rint(numbers / step)
     else:
         ends = (float(numbers.min()), float(numbers.max())) if numbers.size else (0.0, 1.0)
@@ -153,7 +146,7 @@ def _check_steps(path: Location, name: str, step: float, steps: npt.NDArray[Any]
     if not (low >= 0 and high <= LARGEST):
         raise ImageError(
             f"cannot write {str(path)!r}: {name} must lie in 0 to {LARGEST} steps of {step:g} for a PNG, "
-            f"got {low:g} to {high:g}; take .tiff, or another scale"
+            f"got {low:g} to {high:g}; take .tiff, or another depth_scale"
         )
 
 

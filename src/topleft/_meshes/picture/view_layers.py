@@ -52,6 +52,8 @@ class ViewLayers(Mapping[str, Array]):
         self._n_instances = n_instances
 
     def __getitem__(self, name: str) -> Array:
+        if name not in self._arrays:
+            raise KeyError(f"layers drawn are {', '.join(self._arrays)}, got {name!r}")
         return self._arrays[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -64,16 +66,26 @@ class ViewLayers(Mapping[str, Array]):
         return f"ViewLayers({', '.join(f'{name} {array.shape} {array.dtype}' for name, array in self.items())})"
 
     def save(
-        self, path: str | os.PathLike[str], layer: str | None = None, *, scale: float | None = None
+        self, path: str | os.PathLike[str], layer: str | None = None, *, depth_scale: float = 0.001
     ) -> tuple[Location, ...]:
-        """Write the layers, or one of them, and return the files; see `topleft._meshes.io.layer_files.save_layers`.
+        """Write the layers, or one of them, and return the files.
+
+        Parameters
+        ----------
+        path : path or URL
+            `.npz` and `.npy` hold arrays as they are, `.tif` float32 or int32, `.png` whole numbers of 16 bits with 0
+            where nothing is: ids plus 1, distances in steps. `{layer}` in the name stands for the name of the layer.
+        layer : str, optional
+            This one alone.
+        depth_scale : float
+            Units of a step of distances in PNG: 0.001 writes millimetres where units are metres.
 
         Raises
         ------
         ValueError
             If there is no such layer; and as `save_layers` does.
         """
-        return save_layers(path, self if layer is None else {layer: self._named(layer)}, scale=scale)
+        return save_layers(path, self if layer is None else {layer: self._named(layer)}, depth_scale=depth_scale)
 
     def rle(
         self, layer: LayerOption = "instance", *, labels: npt.ArrayLike | None = None, compressed: bool = True
