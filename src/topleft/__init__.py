@@ -223,7 +223,8 @@ def _publish(value: Any) -> Any:
 
 def __getattr__(name: str) -> Any:
     if name not in _LATE:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        text = f"module {__name__!r} has no attribute {name!r}: help(topleft) lists its names by task"
+        raise AttributeError(text, name=name, obj=sys.modules[__name__])
     import_module(_LATE[name])
     for late, file in _LATE.items():  # others that this import has loaded are published, too
         if hasattr(sys.modules.get(file), late):

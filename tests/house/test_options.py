@@ -148,3 +148,23 @@ def test_every_public_option_that_takes_a_word_lists_its_words():
 
 def test_options_of_views_list_their_words():
     assert [name for name, kind in typing.get_type_hints(ViewOptions).items() if kind is str] == []
+
+
+@pytest.mark.parametrize(
+    ("option", "guess", "right"),
+    [
+        ("LayerOption", "normal", "world_normal or camera_normal"),
+        ("LayerOption", "position", "world_position"),
+        ("SamplingOption", "all_touched", "outer"),
+        ("FilterOption", "linear", "bilinear or trilinear"),
+        ("CullOption", "backface", "back"),
+        ("ShadingOption", "phong", "smooth"),
+    ],
+)
+def test_first_guess_is_answered_with_the_right_word(option, guess, right):
+    assert options.meant(guess, get_args(getattr(words, option))) == f": {right}?"
+
+
+def test_first_guesses_lead_to_words_of_options():
+    known = {word for name in words.__all__ for word in get_args(getattr(words, name))}
+    assert {word for guesses in options.FIRST_GUESSES.values() for word in guesses} <= known

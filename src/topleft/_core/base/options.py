@@ -41,6 +41,15 @@ class Sink(IntEnum):
     SAMPLES = 6
 
 
+#: Words of other programs, for the words of any option here.
+FIRST_GUESSES = {
+    "all_touched": ("outer",), "alpha": ("over",), "face": ("triangle",), "faces": ("triangle",),
+    "gouraud": ("smooth",), "id": ("triangle", "instance"), "mask": ("silhouette", "coverage"),
+    "normal": ("world_normal", "camera_normal", "normals"), "normals": ("world_normal", "camera_normal"),
+    "object_id": ("instance",), "phong": ("smooth",), "rgb": ("color",), "segmentation": ("instance",),
+    "sun": ("directional",), "winding": ("nonzero",), "z": ("distance",),
+}  # fmt: skip
+
 SAMPLINGS = {sampling.value: sampling for sampling in Sampling}
 """By their words: calling the enum takes five times as long."""
 
@@ -59,7 +68,17 @@ def parse_sampling(value: object) -> Sampling:
 def check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
     """Raise a `ValueError` unless the value is among a few words."""
     if not (isinstance(value, str) and value in choices):
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}{meant(value, choices)}")
+
+
+def meant(value: object, choices: tuple[str, ...]) -> str:
+    """Return the end of a message that names the words that a wrong one may stand for, or nothing."""
+    from difflib import get_close_matches  # costs import time, and only errors need it
+
+    word = str(value).casefold()
+    guesses = [each for each in FIRST_GUESSES.get(word, ()) if each in choices]
+    guesses = guesses or get_close_matches(word, choices, 2)
+    return f": {' or '.join(guesses)}?" if isinstance(value, str) and guesses else ""
 
 
 LAYER_NAMES: tuple[str, ...] = get_args(LayerOption)
@@ -71,5 +90,5 @@ def check_layers(names: str | Iterable[str]) -> tuple[str, ...]:
     checked = tuple(dict.fromkeys(as_names("layers", names)))
     for name in checked:
         if name not in LAYER_NAMES:
-            raise ValueError(f"layers must be some of {', '.join(LAYER_NAMES)}, got {name!r}")
+            raise ValueError(f"layers must be some of {', '.join(LAYER_NAMES)}, got {name!r}{meant(name, LAYER_NAMES)}")
     return checked

@@ -13,7 +13,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.arrays import as_real, as_square, check_regular, shown
+from topleft._core.base.arrays import as_real, check_regular, shown
 
 BOP_POSES = (("cam_R_m2c", "cam_t_m2c"), ("cam_R_w2c", "cam_t_w2c"))
 """Rotation, nine numbers row by row, and translation: of a model and of the world, as seen by the camera."""
@@ -46,7 +46,9 @@ def as_pose(name: str, pose: Any) -> F64:
         matrix = joined_pose(rotation_of_vector(turn.ravel()) if turn.size == 3 else turn, shift.ravel())
     else:
         matrix = as_real(name, pose)
-        matrix = as_square(name, joined_pose(matrix[:, :3], matrix[:, 3]) if matrix.shape == (3, 4) else matrix, 4)
+        if matrix.shape not in ((4, 4), (3, 4)):
+            raise ValueError(f"{name} must be {FORMS}, got shape {matrix.shape}")
+        matrix = joined_pose(matrix[:3, :3], matrix[:3, 3]) if matrix.shape == (3, 4) else matrix.copy()
     if not np.isfinite(matrix).all():
         raise ValueError(f"{name} must hold finite numbers, got {shown(pose)}")
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
