@@ -316,11 +316,15 @@ def fragments(
             edges = [(b, c), (c, a), (a, b)]  # opposite the first, second and third vertex
         else:
             edges = [(c, b), (a, c), (b, a)]
-        owned = [is_top_left(*edge) for edge in edges]
+        first, second, third = edges
+        least = [0 if is_top_left(*edge) else 1 for edge in edges]  # of integers: 1 is more than 0
         for row, column in touched_pixels(piece, size, origin, 0 if is_exact else bits):
             at = ((16 * (column + x_origin) + 8 + sample[0]) * unit, (16 * (row + y_origin) + 8 + sample[1]) * unit)
-            e0, e1, e2 = (edge_function(*edge, at) for edge in edges)
-            if all(e > 0 or (e == 0 and is_owned) for e, is_owned in zip((e0, e1, e2), owned, strict=True)):
+            if (
+                (e0 := edge_function(*first, at)) >= least[0]
+                and (e1 := edge_function(*second, at)) >= least[1]
+                and (e2 := edge_function(*third, at)) >= least[2]
+            ):
                 yield Fragment(row, column, piece, (e0, e1, e2))
 
 
