@@ -161,15 +161,6 @@ TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float dep
 /* Writes rows of a picture of `width` columns from `to` on, with non-temporal stores. */
 TL_KERNEL(void, lay_rows, const tl_laid_rows *rows, int32_t *to, int64_t width)
 
-/* Lists the pixels whose samples differ in their id, from entry `at` on; needs room for 16 entries more.  Returns the
- * end of the list. */
-TL_KERNEL(int64_t, split_pixels, const tl_seen_samples *seen, const tl_split *split, int64_t at)
-
-/* Writes rows of `width` ids of sample k > 0 from the ids of the first sample and from `split`, which begins with the
- * row of `ids`. */
-TL_KERNEL(void, spread_ids, const tl_split *split, int k, int64_t n_rows, int64_t width, const int32_t *first_ids,
-          int32_t *ids)
-
 /* Writes which of n instances each id belongs to, -1 below 0; instance i has the ids first_ids[i] to first_ids[i + 1] -
  * 1. Widens `boxes`, (n, 4) left, top, right, bottom, or NULL, by the pixels of each instance. */
 TL_KERNEL(void, find_instances, const int32_t *ids, int64_t n_rows, int64_t width, const int64_t *first_ids, int64_t n,
@@ -268,11 +259,9 @@ TL_KERNEL(void, shade, const tl_shaded_scene *scene, const tl_window *window, co
           const float *depth, uint8_t *pixels)
 
 /* Shades and averages several samples a pixel, from planes of ids and depth, `stride` pixels apart, one a sample;
- * samples_fx as in tl_target, all else as in `shade`.  With `split`, which has the rows of the window, `ids` and
- * `depth` have only the plane of the first sample. */
+ * samples_fx as in tl_target, all else as in `shade`. */
 TL_KERNEL(void, shade_samples, const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
-          int sample_bits, int64_t stride, const int32_t *ids, const float *depth, const tl_split *split,
-          uint8_t *pixels)
+          int sample_bits, int64_t stride, const int32_t *ids, const float *depth, uint8_t *pixels)
 
 /* Writes unit normals on the visible side, float32 (x, y, z), 0 for the background, rotated by shading->eye_from; show
  * is NORMALS. */

@@ -281,24 +281,6 @@ typedef struct {
 
 #define TL_MAX_SAMPLES 16 /* of a pixel */
 
-/* Split pixels, which show several triangles, row by row from left to right: row y has [rows[2 y], rows[2 y + 1]) of
- * the columns, and of the ids and depths of each sample but the first, which are `room` numbers apart. */
-typedef struct {
-    int64_t *rows;
-    int32_t *columns, *ids;
-    float *depth;
-    int64_t room;
-} tl_split;
-
-/* The ids and depths of 2^sample_bits samples in the rows [row0, row0 + n_rows) of a picture: the first sample in all
- * columns, other samples, `plane` pixels apart, in the columns [col0, col0 + n_cols): elsewhere they are background. */
-typedef struct {
-    const int32_t *first_ids, *ids;
-    const float *depth;
-    int64_t first_stride, stride, plane, row0, n_rows, col0, n_cols;
-    int sample_bits;
-} tl_seen_samples;
-
 /* Rows of a picture that were drawn in the columns [col0, col0 + n_cols), `stride` numbers apart; elsewhere they are
  * `blank`. */
 typedef struct {

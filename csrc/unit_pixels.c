@@ -11,7 +11,6 @@
 #include "pixels/resolve.c"
 #include "pixels/rle.c"
 #include "pixels/slopes.c"
-#include "pixels/split.c"
 #include "pixels/texels.c"
 #include "pixels/weights.c"
 #include "pixels/weights_exact.c"

@@ -1,7 +1,7 @@
 /* Shades and resolves a visibility buffer with several samples a pixel.  A triangle is shaded once in each pixel that
  * it shows in, at the first of its samples; the pixel is the mean of the light at its samples, each clamped to white,
  * as on a display and in the buffers of graphics hardware.
- * In: planes of ids, or one plane and the split pixels; the instances.  Out: red, green, blue and opacity, uint8. */
+ * In: planes of ids; the instances.  Out: red, green, blue and opacity, uint8. */
 #ifndef TL_SHADE_SAMPLES_C
 #define TL_SHADE_SAMPLES_C
 
@@ -108,76 +108,24 @@ TL_INLINE vi finish_lanes(const sample_sums *sums, const tl_shading *shading, in
     return vi_select(vf_lt(vf_set1(0.0f), share), word, vi_set1(background));
 }
 
-/* The ids and depths of the samples of a span of pixels, a plane a sample. */
-typedef struct {
-    int32_t ids[TL_MAX_SAMPLES][TL_SPAN_ROOM];
-    float depth[TL_MAX_SAMPLES][TL_SPAN_ROOM];
-} span_samples;
-
-/* Writes the ids and depths of the samples of n pixels.  Split pixels from `at` to `end` may lie in the span; `ids` and
- * `depth` are those of the first sample.  Returns the first split pixel of the next span. */
-static int64_t unpack_span(const tl_split *split, int64_t at, int64_t end, int64_t column, int n, int sample_bits,
-                           const int32_t *ids, const float *depth, span_samples *span)
-{
-    for (int k = 0; k < 1 << sample_bits; k++)
-        memcpy(span->ids[k], ids, (size_t)n * sizeof *ids);
-    memcpy(span->depth[0], depth, (size_t)n * sizeof *depth); /* others are read only in split pixels */
-    for (; at < end && split->columns[at] < column + n; at++) {
-        const int64_t x = split->columns[at] - column;
-        for (int k = 1; k < 1 << sample_bits; k++) {
-            span->ids[k][x] = split->ids[(k - 1) * split->room + at];
-            span->depth[k][x] = split->depth[(k - 1) * split->room + at];
-        }
-    }
-    return at;
-}
-
-/* Sets the triangles of n pixels whose samples all show the triangle of the first sample. */
-TL_INLINE int find_whole(sample_sums *sums, const int32_t *ids, int sample_bits, int n)
-{
-    const vi none = vi_set1(-1);
-    vm any = vm_first(0);
-    for (int x = 0; x < n; x += TL_LANES) {
-        const vm inside = vm_first(n - x);
-        const vi own = vi_select(inside, vi_load_masked(inside, ids + x), none);
-        any = vm_or(any, vi_gt(own, none));
-        vi_store(sums->ids + x, vi_max(own, none));
-        vf_store(sums->n_seen + x, vf_set1((float)(1 << sample_bits)));
-    }
-    return vm_any(any);
-}
-
 static void shade_samples(const tl_shaded_scene *scene, const tl_window *window, const int32_t *samples_fx,
-                          int sample_bits, int64_t stride, const int32_t *ids, const float *depth,
-                          const tl_split *split, uint8_t *pixels)
+                          int sample_bits, int64_t stride, const int32_t *ids, const float *depth, uint8_t *pixels)
 {
     const tl_shading *shading = scene->instances->shading;
     shade_runs s;
     span_list list;
     sample_sums sums;
-    span_samples span;
     start_runs(&s, window, scene->view);
     start_list(&list, scene);
     for (int64_t row = 0; row < window->height && !tl_is_given_up(window); row++) {
-        const int64_t end = split ? split->rows[2 * row + 1] : 0;
-        int64_t next = split ? split->rows[2 * row] : 0;
         tl_count_work(window, TL_SHADE_PX * window->width);
         for (int64_t column = 0; column < window->width; column += TL_SPAN) {
             const int64_t at = row * window->width + column;
             const int n = (int)min64(TL_SPAN, window->width - column);
-            const int is_whole = split && (next == end || split->columns[next] >= column + n);
-            const int32_t *own = ids + at;
-            const float *own_depth = depth + at;
-            int64_t own_stride = stride;
             memset(&sums, 0, offsetof(sample_sums, n_seen));
-            if (split && !is_whole) {
-                next = unpack_span(split, next, end, column, n, sample_bits, own, own_depth, &span);
-                own = span.ids[0], own_depth = span.depth[0], own_stride = TL_SPAN_ROOM;
-            }
-            for (int k = 0; k < (is_whole ? 1 : 1 << sample_bits); k++)
-                if (is_whole ? find_whole(&sums, own, sample_bits, n)
-                             : find_first_seen(&sums, own, own_stride, sample_bits, k, n))
-                    add_shaded(&sums, &s, &list, samples_fx + 2 * k, row, column, n, own_depth + k * own_stride);
+            for (int k = 0; k < 1 << sample_bits; k++)
+                if (find_first_seen(&sums, ids + at, stride, sample_bits, k, n))
+                    add_shaded(&sums, &s, &list, samples_fx + 2 * k, row, column, n, depth + at + k * stride);
             for (int x = 0; x < n; x += TL_LANES)
                 vi_store_masked((int32_t *)pixels + at + x, vm_first(n - x),
                                 finish_lanes(&sums, shading, sample_bits, x));

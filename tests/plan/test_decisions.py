@@ -120,14 +120,9 @@ def labels():
     return of_scenes(lambda v, s: choices.pays_to_sort_labels(v, s, 1), *options)
 
 
-def split():
-    options = {"sampling": "msaa2"}, {"sampling": "msaa8"}
-    return [choices.pays_to_split(view, n) for view in views(*options) for n in COUNTS]
-
-
 GRIDS = (
     arrays_by_threads, draws_by_threads, shares, clusters, sampled, instances, flat, sorting, bounds,
-    blending, colours, labels, split,
+    blending, colours, labels,
 )  # fmt: skip
 
 #: Of each grid: cases, how many are not the commonest, and the beginning of a hash of all.
@@ -144,7 +139,6 @@ DECIDED = {
     "blending": (28672, 24576, "fa4ac31c7f40f8c6"),
     "colours": (3584, 1520, "778993070f0538f7"),
     "labels": (7168, 2944, "9f41a14eaea4aa86"),
-    "split": (672, 289, "13a948a471d0955a"),
 }  # fmt: skip
 
 

@@ -1,21 +1,15 @@
 """Several samples a pixel: each is the engine's own picture, seen from the sample."""
 
 import copy
-from functools import partial
 
 import numpy as np
 import pytest
 from comparing import assert_same
 from engine_cases import ON_EACH_ISA, THREADS, kept, mixed, on, one_by_one, sharing
-from pages import before_a_page, behind_a_page
 from strategies import CLIP_SCENES, PIXEL_SCENES, Scene, few_bits, floor, on_centres, slivers, with_depth
 
 import topleft as tl
-from topleft._core.base.memory import FRESH
-from topleft._core.raster import choices
-from topleft._core.raster.rasterize import draw_fragments, fragment_options
 from topleft._core.raster.sampling import POSITIONS
-from topleft._core.raster.view import View
 from topleft.methods.reference import sampling as ref
 
 sample_coverage, sample_ids = kept(ref.sample_coverage), kept(ref.sample_ids)
@@ -194,124 +188,22 @@ def test_index_outside_the_vertices_is_an_error():
             verb([[0, 0], [1, 0], [0, 1]], [[0, 1, 2], [0, 1, 3]], (4, 4), sampling="msaa4")
 
 
-# ---- what is kept of samples for shading ----------------------------------------------------------------------------
-
-
-def split_ids(vertices, triangles, size, memory=FRESH, depth_test="less", background_depth=None, out=None, **options):
-    """The visibility buffer as pictures have it drawn."""
-    view = View.parse(size, options).but(is_split=True)
-    with choices.forced(pays_to_split=True):
-        options = fragment_options(view, depth_test, background_depth, out)
-        return draw_fragments(memory, vertices, triangles, view, options)
-
-
-def listed(frags):
-    """Pixels that are listed, (H, W), and ids and depths of samples (H, W, S) from the lists; other depths are NaN."""
-    n, split = len(frags._split.drawn.positions), frags._split.split
-    is_listed = np.zeros(frags.id.shape, bool)
-    ids, depth = np.repeat(frags.id[..., None], n, -1), np.full((*frags.id.shape, n), np.nan, np.float32)
-    depth[..., 0] = frags.depth
-    for y, (first, end) in enumerate(split.rows):
-        columns = split.columns[first:end]
-        assert (np.diff(columns) > 0).all()
-        is_listed[y, columns] = True
-        ids[y, columns, 1:], depth[y, columns, 1:] = split.ids[:, first:end].T, split.depth[:, first:end].T
-    return is_listed, ids, depth
-
-
-def check_kept(frags):
-    """The pixels listed are those whose samples differ, and all samples are those of the planes."""
-    before = frags.id, frags.depth
-    is_listed, ids, depth = listed(frags)
-    spread = frags.samples_triangle  # from the lists: planes are drawn when depths are asked for
-    assert frags._split is not None
-    planes = frags.samples_depth, frags.samples_triangle
-    assert frags._split is None
-    assert_same(is_listed, (planes[1] != planes[1][..., :1]).any(-1))
-    assert_same(ids, planes[1])
-    assert_same(spread, planes[1])
-    is_known = ~np.isnan(depth)
-    assert_same(depth[is_known].view(np.int32), planes[0][is_known].view(np.int32))
-    assert is_known[is_listed].all()
-    assert_same(before[0], frags.id)
-    assert_same(before[1].view(np.int32), frags.depth.view(np.int32))
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("name", [name for name in SCENES if name not in ("empty", "guard_band")])
-def test_listed_pixels_are_those_whose_samples_see_several_triangles(isa, name):
-    scene = SCENES[name](np.random.default_rng(31))
-    with on(isa):
-        for n, threads in zip(COUNTS, THREADS, strict=True):
-            check_kept(draw(scene, n, split_ids, threads=threads))
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("depth_test", ["less", "greater", None])
-def test_listed_pixels_of_all_sizes_and_many_bands(isa, depth_test):
-    scene = mixed(np.random.default_rng(9), 400, (1900, 75), origin=(-40, 7))
-    with on(isa):
-        for n, threads in zip(COUNTS, THREADS, strict=True):
-            check_kept(draw(scene, n, split_ids, threads=threads, depth_test=depth_test, background_depth=0.25))
-
-
-class Guarded:
-    """Memory between pages that must not be touched, where a rasterizer keeps its own."""
-
-    def __init__(self, guard):
-        self.guard, self.names = guard, []
-
-    def empty(self, name, shape, dtype):
-        self.names.append(name)
-        return self.guard(np.zeros(shape, dtype))
-
-    scratch = empty
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("guard", [before_a_page, behind_a_page])
-@pytest.mark.parametrize("width", [1, 15, 16, 17, 611])
-def test_lists_of_every_pixel_stay_in_their_room(isa, guard, width):
-    x = np.arange(2 * width)[:, None] / 2 - 0.25  # every pixel shows two of them
-    y = np.broadcast_to([0, 0, 70, 70], (2 * width, 4))
-    corners = np.stack([x + [0, 0.5, 0, 0.5], y, 0 * y], -1).reshape(-1, 3)
-    triangles = (4 * np.arange(2 * width)[:, None] + [0, 1, 2, 1, 3, 2]).reshape(-1, 3)
-    rasterizer = tl.Rasterizer((width, 67), threads=3)
-    rasterizer._lent.memory = Guarded(guard)
-    with on(isa):
-        frags = split_ids(corners, triangles, (width, 67), rasterizer._lent.memory, sampling="msaa8", threads=3)
-        assert listed(frags)[0].all()
-        check_kept(frags)
-    assert "split columns of samples" in rasterizer._lent.memory.names
-
-
 def test_samples_outlive_what_other_verbs_do_with_the_memory():
     scene = mixed(np.random.default_rng(2), 50, (40, 30))
     expected = draw(scene, 4, tl.rasterize)
     rasterizer = tl.Rasterizer(scene.size)
-    for found in (rasterizer.rasterize, partial(split_ids, size=scene.size, memory=rasterizer._lent.memory)):
-        frags = found(scene.vertices, scene.triangles, sampling="msaa4")
-        for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
-            verb(scene.vertices[::-1] * 3, scene.triangles[::-1])
-        assert_same(frags.samples_triangle, expected.samples_triangle)
-        assert_same(frags.samples_depth, expected.samples_depth)
+    frags = rasterizer.rasterize(scene.vertices, scene.triangles, sampling="msaa4")
+    for verb in (rasterizer.coverage, rasterizer.overdraw, rasterizer.rasterize):
+        verb(scene.vertices[::-1] * 3, scene.triangles[::-1])
+    assert_same(frags.samples_triangle, expected.samples_triangle)
+    assert_same(frags.samples_depth, expected.samples_depth)
 
 
 def test_a_copy_keeps_its_samples():
-    frags = draw(mixed(np.random.default_rng(2), 50, (40, 30)), 4, split_ids)
+    frags = draw(mixed(np.random.default_rng(2), 50, (40, 30)), 4, tl.rasterize)
     found = copy.copy(frags)
     assert_same(found.samples_triangle, frags.samples_triangle)
     assert_same(found.sample(2).depth, frags.sample(2).depth)
-
-
-def test_triangles_that_change_before_samples_are_asked_for_are_an_error():
-    corners, triangles = np.array([[0, 0, 1.0], [9, 0, 1], [0, 9, 1]]), np.array([[0, 1, 2]], np.int32)
-    frags = split_ids(corners, triangles, (8, 8), sampling="msaa4")
-    planes = tl.rasterize(corners, triangles, (8, 8), sampling="msaa4")
-    triangles[0, 2] = 3
-    assert (planes.samples_depth[0, 0] == 1).all()
-    with pytest.raises(IndexError, match="triangles must not change until samples are read"):
-        frags.samples_depth  # noqa: B018
 
 
 # ---- large shapes ---------------------------------------------------------------------------------------------------

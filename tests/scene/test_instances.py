@@ -52,8 +52,7 @@ def drawn_one_by_one(scene, camera, cull, **options):
 @ON_EACH_ISA
 @pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa8"])
 @pytest.mark.parametrize("bits", [8, "exact"])
-def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, monkeypatch, force):
-    force(pays_to_split=True)
+def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, monkeypatch):
     rng = np.random.default_rng(5)
     cube = tl.Mesh(*tl.scenes.shape("cube"))
     ball, empty = tl.Mesh(*tl.scenes.icosphere(2)), tl.Mesh(np.zeros((3, 3)), np.empty((0, 3), np.int32))

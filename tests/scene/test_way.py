@@ -60,7 +60,6 @@ def test_samples_of_a_mesh_are_drawn_once_where_they_are_returned():
     camera, size = tl.Camera.framing(ball), (64, 64)
     calls = passed(lambda: tl.rasterize_mesh(ball, camera, size, sampling="msaa4", threads=1).samples_depth)[2]
     assert calls.count("draw_planes") == 1
-    assert "draw_split" not in calls
 
 
 def test_pictures_tell_kinds_apart_where_they_come_in_alone():

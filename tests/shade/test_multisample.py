@@ -5,14 +5,11 @@ import sys
 import numpy as np
 import pytest
 from comparing import assert_same
-from engine_cases import ON_EACH_ISA, on
 
 import topleft as tl
 from topleft._core.base.color import id_colors, srgb_tables
 from topleft._core.raster.cluster_draw import ClusteredMesh
-from topleft._meshes.picture.holes import draw_visible
 from topleft._meshes.picture.shade import GREY_OF_FARTHEST, GREY_OF_NEAREST
-from topleft._meshes.picture.shot import Shot
 from topleft.methods.reference.sampling import mean
 
 SIZE = (48, 36)
@@ -25,32 +22,6 @@ def test_alpha_is_the_share_of_samples_with_a_triangle(n):
     got = tl.render(KNOT, size=SIZE, sampling=f"msaa{n}", background=CLEAR)
     frags = tl.rasterize_mesh(KNOT, size=SIZE, sampling=f"msaa{n}")
     assert_same(got[..., 3], np.rint(255 * (frags.samples_triangle >= 0).mean(-1)).astype(np.uint8))
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("shading", ["smooth", "flat", "normals"])
-@pytest.mark.parametrize("size", [SIZE, (1100, 40)])
-def test_picture_is_the_same_from_planes_of_samples(force, isa, shading, size):
-    force(pays_to_cluster=False, pays_to_split=True)  # planes of samples
-    square = tl.Camera.orthographic(tl.Camera.framing(KNOT).view, near=0.1, far=30, height=3)
-    look = {"shading": shading, "fog": tl.Fog(2.0, 9.0), "background": (10, 200, 30, 100)}
-    lights = [tl.Light((1, 2, 3), kind="point")]
-    with on(isa):
-        for camera, n in ((None, 4), (square, 2), (square, 16)):
-            camera = camera or tl.Camera.framing(KNOT)
-            frags = draw_visible(Shot.of(KNOT, camera, size), sampling=f"msaa{n}", threads=3)
-            from_lists = tl.shade(frags, KNOT, camera, lights=lights, **look)
-            assert frags._split is not None
-            assert frags.samples_depth.shape[-1] == n
-            assert frags._split is None
-            assert_same(tl.shade(frags, KNOT, camera, lights=lights, **look), from_lists)
-
-
-def test_samples_of_a_small_picture_are_kept_one_by_one():
-    cube = Shot.of(tl.Mesh(*tl.scenes.cube()), None, (150, 150))
-    assert draw_visible(cube, sampling="msaa4")._split is None
-    assert draw_visible(cube, sampling="msaa8")._split is not None
-    assert draw_visible(Shot.of(KNOT, None, (150, 150)), sampling="msaa8")._split is None
 
 
 @pytest.mark.parametrize("look", [{}, {"shading": "ids"}, {"cutoff": 0.5}, {"edges": True}, {"cull": "back"}])

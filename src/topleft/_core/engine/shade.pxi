@@ -434,19 +434,16 @@ cdef class ShadedScene:
                     K.shade(&self.scene, &window, at_fx, &ids[first_row, 0], &depth[first_row, 0], &pixels[first_row, 0, 0])
             raise_if_given_up()
 
-    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth, Split split or None,
+    def shade_samples(self, const int32_t[:, ::1] positions, const int32_t[:, :, ::1] ids, const float[:, :, ::1] depth,
                       uint8_t[:, :, ::1] pixels, int64_t first_row, int64_t n_rows):
-        """The kernel `shade_samples`. `ids` and `depth`: (S, H, W), or with `split` (1, H, W)."""
+        """The kernel `shade_samples`. `ids` and `depth`: (S, H, W)."""
         cdef tl_window window = self.mesh.window(first_row, n_rows, ids.shape[2])
         cdef int sample_bits = int(positions.shape[0]).bit_length() - 1
         cdef int64_t stride = ids.shape[1] * ids.shape[2]
-        cdef tl_split rows
-        if split is not None:
-            rows = split.from_row(first_row)
         if n_rows and ids.shape[2]:
             with nogil:
                 K.shade_samples(&self.scene, &window, &positions[0, 0], sample_bits, stride, &ids[0, first_row, 0], &depth[0, first_row, 0],
-                                &rows if split is not None else NULL, &pixels[first_row, 0, 0])
+                                &pixels[first_row, 0, 0])
             raise_if_given_up()
 
     def shade_normals(self, const int32_t[:, ::1] ids, float[:, :, ::1] out, int64_t first_row, int64_t n_rows):

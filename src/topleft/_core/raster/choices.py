@@ -470,18 +470,6 @@ def lays_ground(found: FillRoute, view: View, *, is_flat: bool) -> bool:
     return found is not FillRoute.NOTHING
 
 
-def can_split(view: View, n_triangles: int) -> bool:
-    """Tell whether pixels that show one triangle may keep its id and depth once, not by sample."""
-    is_possible = view.sampling.n_samples > 1 and 0 not in view.size and n_triangles > 0 and can_slice(view)
-    return view.is_split and is_possible and pays_to_split(view, n_triangles)
-
-
-def pays_to_split(view: View, n_triangles: int) -> bool:
-    """Tell whether keeping few of the samples saves more than sorting the triangles takes."""
-    least, of_triangle = cost_table().unsplit
-    return view.size[0] * view.size[1] * view.sampling.n_samples > least + of_triangle * n_triangles
-
-
 def earlier_wins(test: DepthTestOption | None, *, has_depth: bool) -> bool:
     """Tell whether the triangle with the lower index shows at equal depth; otherwise that with the higher index."""
     return test is not None and has_depth

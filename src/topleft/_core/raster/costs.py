@@ -79,13 +79,6 @@ class Costs:
         "buffers that bands are written to past the caches",
         "msaa4, 1,500 of 70 px, 800x800: 5.3 -> 3.8 ms",
     )
-    split_bytes: float = row(256 << 10, "bytes", "the same, where a band is drawn for all samples at once", STUDY)
-    unsplit: Numbers = row(
-        (9e4, 8.0),
-        "samples, of a triangle",
-        "pictures whose samples are kept one by one",
-        "render by msaa4 and 8 of 12 to 100,000 triangles, 64x64 to 1280x720: 0.7 to 1.0 of the time below, 1.1 above",
-    )
     label_bytes: float = row(512 << 10, "bytes", "labels of all samples in a band", STUDY)
     label_planes: float = row(
         8 << 20, "bytes", "labels of all samples of a picture, past the cache", "fill by msaa4 and 8, 3 to 300 px"

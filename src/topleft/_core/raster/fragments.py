@@ -15,7 +15,6 @@ from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.base.texels import ValueLevels, as_levels
 from topleft._core.raster.backward import Backward
-from topleft._core.raster.sampling import SplitSamples
 from topleft._core.raster.view import View
 from topleft.typing import EdgesOption, EncodingOption, FilterOption, WrapOption
 
@@ -74,31 +73,23 @@ class SampleBuffers(NamedTuple):
     """The ids and depths of the samples of a picture, as kernels read them."""
 
     ids: NDArray[Any]
-    """int32, planes (S, H, W), or (1, H, W) of the first with `split`; int64 where int32 does not count triangles."""
+    """int32, planes (S, H, W); int64 where int32 does not count triangles."""
     depth: NDArray[np.float32]
-    split: engine.Split | None
-    n_samples: int
 
     @classmethod
-    def of(cls, ids: NDArray[Any], depth: NDArray[Any], split: engine.Split | None = None, n: int = 0) -> Self:
+    def of(cls, ids: NDArray[Any], depth: NDArray[Any]) -> Self:
         """Take planes; planes that kernels cannot read are copied."""
-        return cls(as_read(ids, ids.dtype), as_read(depth, np.float32), split, n or len(ids))
+        return cls(as_read(ids, ids.dtype), as_read(depth, np.float32))
+
+    @property
+    def n_samples(self) -> int:
+        """The number of samples of a pixel."""
+        return len(self.ids)
 
     def split_pixels(self) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]], NDArray[Any], NDArray[np.float32]]:
         """Return rows and columns (P,) of pixels that show several triangles, and ids and depths (S, P)."""
-        ids, depth, split = self.ids, self.depth, self.split
-        if split is None:
-            is_split = np.zeros(ids.shape[1:], np.bool_)
-            for other in ids[1:]:
-                is_split |= other != ids[0]
-            rows, columns = np.nonzero(is_split)
-            return (rows, columns), ids[:, rows, columns], depth[:, rows, columns]
-        counts = split.rows[:, 1] - split.rows[:, 0]
-        rows = np.repeat(np.arange(len(counts)), counts)
-        own = np.arange(counts.sum()) + np.repeat(split.rows[:, 0] - (np.cumsum(counts) - counts), counts)
-        columns = split.columns[own].astype(np.intp)
-        split_ids = np.concatenate([ids[:, rows, columns], split.ids[:, own]])
-        return (rows, columns), split_ids, np.concatenate([depth[:, rows, columns], split.depth[:, own]])
+        rows, columns = np.nonzero((self.ids[1:] != self.ids[0]).any(axis=0))
+        return (rows, columns), self.ids[:, rows, columns], self.depth[:, rows, columns]
 
 
 def as_read(planes: NDArray[Any], kind: npt.DTypeLike) -> NDArray[Any]:
@@ -281,8 +272,8 @@ class Attributes:
 class Fragments(Attributes):
     """The visibility buffer that `rasterize` returns.
 
-    Attributes, and all samples but the first, are computed on first access, from the `triangles` that were passed
-    in, and for clip space from the `vertices` too: do not change those arrays before.
+    Attributes are computed on first access, from the `triangles` that were passed in, and for clip space from the
+    `vertices` too: do not change those arrays before.
 
     Attributes
     ----------
@@ -312,8 +303,6 @@ class Fragments(Attributes):
 
     #: Ids and depth of several samples as drawn, (S, H, W).
     _planes: tuple[NDArray[Any], NDArray[np.float32]] | None = None
-    #: What stands for the planes until they are read.
-    _split: SplitSamples | None = None
     #: The mesh as each of several samples sees it.
     _meshes: Sequence[engine.SnappedMesh | PartOfMesh] = ()
     #: The mesh that it was drawn from; None where that is not kept.
@@ -343,10 +332,7 @@ class Fragments(Attributes):
 
     @property
     def drawn_planes(self) -> tuple[NDArray[Any], NDArray[np.float32]]:
-        """Ids and depth of all samples as they were drawn, (S, H, W); drawn now, if they were not."""
-        if self._split is not None:
-            self._planes, self._meshes = self._split.planes(), self._split.drawn.meshes
-            self._split = None
+        """Ids and depth of all samples as they were drawn, (S, H, W)."""
         return self._planes or (self.id[None], self.depth[None])
 
     def _of_sample(self, k: int, ids: NDArray[Any], depth: NDArray[np.float32]) -> Fragments:
@@ -375,9 +361,6 @@ class Fragments(Attributes):
 
     def _buffers(self) -> SampleBuffers:
         """Return the ids and depths of the samples, as drawn."""
-        split = self._split
-        if split is not None:
-            return SampleBuffers.of(split.ids[None], split.depth[None], split.split, len(split.drawn.positions))
         return SampleBuffers.of(*self.drawn_planes)
 
     def __repr__(self) -> str:
@@ -399,7 +382,7 @@ class Fragments(Attributes):
     @property
     def samples_id(self) -> NDArray[Any]:
         """The ids of `id` at each sample, (H, W, S)."""
-        return np.moveaxis(self._whole(self.drawn_planes[0] if self._split is None else self._split.sample_ids), 0, -1)
+        return np.moveaxis(self._whole(self.drawn_planes[0]), 0, -1)
 
     @property
     def samples_triangle(self) -> NDArray[np.int32]:
@@ -423,13 +406,6 @@ class Fragments(Attributes):
         """Return the fragments of several samples: planes (S, H, W), and the mesh as each sample sees it."""
         frags = cls(triangle[0], depth[0], meshes[0], n_vertices, n_triangles)
         frags._planes, frags._meshes = (triangle, depth), meshes
-        return frags
-
-    @classmethod
-    def of_split(cls, split: SplitSamples, n_vertices: int, n_triangles: int) -> Fragments:
-        """Return the fragments of several samples; their planes are drawn on first access."""
-        frags = cls(split.ids, split.depth, split.drawn.meshes[0], n_vertices, n_triangles)
-        frags._split = split
         return frags
 
     def _at_sample(self, i: object) -> Fragments:

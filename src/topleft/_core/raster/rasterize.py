@@ -25,7 +25,6 @@ from topleft._core.raster.sampling import (
     SamplePass,
     draw_planes,
     draw_sorted,
-    draw_split,
     lay_background,
     sample_positions,
     sum_areas,
@@ -283,7 +282,7 @@ def draw_fragments(
     names: NDArray[np.int32] | None = None,
 ) -> Fragments:
     """Draw as `rasterize` does, in this memory; with `names` triangle i is called names[i], which ascend."""
-    if view.sampling.n_samples > 1:  # samples are drawn from the snapped mesh on first access
+    if view.sampling.n_samples > 1:  # their attributes are computed from the snapped mesh on first access
         memory = MemoryOf(memory, "samples")
     out = None if options.ids_out is None and options.depth_out is None else (options.ids_out, options.depth_out)
     snapped = snap_mesh(memory, vertices, triangles, view, with_depth=True, out=out)
@@ -325,17 +324,10 @@ def draw_depth(memory: Memory, snapped: Snapped, view: View, options: FragmentOp
 
 
 def draw_samples(memory: Memory, snapped: Snapped, view: View, options: FragmentOptions, drawing: Drawing) -> Fragments:
-    """Draw ids and depth of the first sample and of pixels that show several triangles; or of every sample."""
+    """Draw ids and depth of every sample."""
     (width, height), n = view.size, view.sampling.n_samples
     own = SamplePass(memory, snapped.mesh, sample_positions(n, view.grid_bits), drawing.n_threads)
     check_fits((n, height, width), np.int32, np.float32)
-    can_split = choices.can_split(view, snapped.n_triangles) and not snapped.mesh.is_named
-    if can_split and options.ids_out is None and options.depth_out is None:
-        split = draw_split(own, drawing.sink, (height, width), options.background)
-        if split is None:
-            snapped.refuse()
-        view.mark("draw")
-        return Fragments.of_split(split, snapped.n_vertices, snapped.n_triangles)
     ids, depth = planes_of(memory, view)
     draw_all_samples(own, snapped, view, drawing.sink, ids, depth)
     lay_background(ids, depth, drawing.sink, options.background)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from topleft._core import engine
-from topleft._core.base.cached import cached_property
-from topleft._core.base.memory import FRESH, Memory, check_fits, empty
+from topleft._core.base.memory import Memory
 from topleft._core.base.options import Sink
 from topleft._core.base.threads import run_parts
 from topleft._core.raster.costs import cost_table
@@ -122,107 +120,10 @@ def band_bytes(n_triangles: int, shape: tuple[int, int], n_bytes: int, n_threads
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class SplitSamples:
-    """The ids and depths of several samples a pixel: the first in each, the others in pixels of several triangles."""
-
-    ids: NDArray[np.int32]
-    depth: NDArray[np.float32]
-    split: engine.Split
-    drawn: SamplePass
-    sink: Sink
-    background: float
-
-    @cached_property
-    def sample_ids(self) -> NDArray[np.int32]:
-        """The ids of all samples, (S, H, W)."""
-        ids: NDArray[np.int32] = empty((len(self.drawn.positions), *self.ids.shape), np.int32)
-
-        def spread_rows(first: int, end: int) -> None:
-            ids[0, first:end] = self.ids[first:end]
-            self.split.spread_ids(self.ids, ids, first, end - first)
-
-        run_parts(spread_rows, len(self.ids), self.drawn.n_threads)
-        return ids
-
-    def planes(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """Return the ids and depths of all samples, (S, H, W): a depth is that of the triangle at the sample."""
-        shape = len(self.drawn.positions), *self.ids.shape
-        check_fits(shape, np.int32, np.float32)
-        ids, depth = empty(shape, np.int32), empty(shape, np.float32)
-        if draw_planes(self.drawn, self.sink, ids, depth, is_near=True):
-            raise IndexError("triangles must not change until samples are read")
-        lay_background(ids, depth, self.sink, self.background)
-        return ids, depth
-
-
-def draw_split(own: SamplePass, sink: Sink, shape: tuple[int, int], background: float) -> SplitSamples | None:
-    """Draw the first sample, and list the pixels whose others see more triangles; None as `draw_planes` tells.
-
-    The mesh is near, neither side of the picture is 0. Planes of the other samples live no longer than a band of rows,
-    and only in the columns that its triangles may reach.
-    """
-    memory, (height, width), n_others = own.memory, shape, len(own.positions) - 1
-    bins = own.sort_bands(shape, int(cost_table().split_bytes) // 8, with_columns=True)
-    if bins.bad_row >= 0:
-        return None
-    ids: NDArray[np.int32] = memory.empty("triangle", shape, np.int32)
-    depth: NDArray[np.float32] = memory.empty("depth", shape, np.float32)
-    room = engine.Split.room_of(height, width, bins.n_bands)
-    split = engine.Split(
-        memory.empty("split rows", (height, 2), np.int64),
-        memory.empty("split columns", (room,), np.int32),
-        memory.empty("split ids", (n_others, room), np.int32),
-        memory.empty("split depth", (n_others, room), np.float32),
-    )
-    n_parts = max(1, min(own.n_threads, bins.n_bands))
-    of_band = n_parts, n_others, (width + 16) << bins.band_bits
-    others = memory.empty("band ids", of_band, np.int32), memory.empty("band depth", of_band, np.float32)
-    unused, meshes = list(zip(*others, strict=True)), own.meshes
-    target = engine.Target(sink, ids, depth, None)
-    run_parts(
-        lambda first, end: engine.draw_split_bands(meshes, target, *unused.pop(), split, bins, first, end),
-        bins.n_bands,
-        n_parts,
-    )
-    lay_background(ids, depth, sink, background)
-    for at in split_ranges(split.rows):
-        lay_background(split.ids[:, at], split.depth[:, at], sink, background)
-    return SplitSamples(ids, depth, split, own._replace(memory=FRESH), sink, background)
-
-
 def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, background: float) -> None:
     """Write the depth of the background where nothing is, unless the engine has cleared the buffer to it."""
     if background != (-np.inf if sink is Sink.FARTHEST else np.inf):
         depth[ids < 0] = background
-
-
-def split_ranges(rows: NDArray[np.int64]) -> list[slice]:
-    """Return where the pixels of all rows lie: one range for each part of a picture that a thread drew."""
-    breaks = np.flatnonzero(rows[1:, 0] != rows[:-1, 1])
-    starts, ends = np.append(rows[0, 0], rows[breaks + 1, 0]), np.append(rows[breaks, 1], rows[-1, 1])
-    return [slice(first, end) for first, end in zip(starts.tolist(), ends.tolist(), strict=True)]
-
-
-def split_bytes(
-    n_triangles: int, shape: tuple[int, int], n_samples: int, n_threads: int
-) -> tuple[dict[str, int], dict[str, int]]:
-    """Return the most bytes that `draw_split` needs, by name: of scratch, and of its result."""
-    (height, width), n_others = shape, n_samples - 1
-    band_bits = bits_of_bands(shape, int(cost_table().split_bytes) // 8, n_threads)
-    n_bands = -(-height >> band_bits)
-    n_rows = min(n_threads, n_bands) << band_bits
-    scratch = {
-        "bins": 20 * (n_triangles + 16),
-        "bands": 4 * (n_triangles + 1),
-        "samples of bands": 8 * n_others * n_rows * (width + 16),
-    }
-    room = engine.Split.room_of(height, width, n_bands)
-    return scratch, {
-        "triangle": 4 * height * width,
-        "depth": 4 * height * width,
-        "pixels of several triangles": 16 * height + (4 + 8 * n_others) * room,
-    }
 
 
 def draw_means(own: SamplePass, palette: engine.Palette, pixels: NDArray[Any], ground: NDArray[Any] | None) -> bool:

@@ -124,8 +124,6 @@ class View:
     """1 for each triangle with a side that is not drawn, and the `tl_cull` that names that side."""
     sides_by_material: bool = True
     """Whether materials say which sides are drawn: no `cull` was given."""
-    is_split: bool = False
-    """Whether a pixel of one triangle keeps its samples once, for shading; other samples are drawn on first access."""
     is_exact: bool = False
     """Whether vertices stay where they are: ``subpixel_bits="exact"``."""
 

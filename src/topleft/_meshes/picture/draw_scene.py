@@ -22,7 +22,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import BoxView, Survey, draw_clustered, equal_bands
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import DEFAULT_OPTIONS, FragmentOptions, draw_fragments
-from topleft._core.raster.sampling import SamplePass, draw_sorted, draw_split, lay_background
+from topleft._core.raster.sampling import SamplePass, draw_sorted, lay_background
 from topleft._core.raster.snap import refuse_changed
 from topleft._core.raster.static_mesh import draw_static
 from topleft._meshes.picture.placed import Placed
@@ -54,13 +54,10 @@ class SampleTarget(NamedTuple):
     at: tuple[int, int]
 
 
-def draw_ids(
-    memory: Memory, placed: Placed, options: FragmentOptions = DEFAULT_OPTIONS, *, is_split: bool = True
-) -> Fragments:
-    """Return the visibility buffer of a placed scene; `is_split` as in `View`. `memory` is for one instance."""
+def draw_ids(memory: Memory, placed: Placed, options: FragmentOptions = DEFAULT_OPTIONS) -> Fragments:
+    """Return the visibility buffer of a placed scene. `memory` is for one instance."""
     if placed.is_mesh or len(placed.scene) == 1:  # the length of a scene takes a hundredth of a small picture
         mesh, view = placed.scene[0].mesh, placed.view_of(0)
-        view = view.but(is_split=True) if is_split and view.sampling.n_samples > 1 else view
         if view.static is not None:
             drawn = draw_static(memory, view.static, view, options)
         else:
@@ -70,9 +67,6 @@ def draw_ids(
     (width, height), positions = placed.view.size, placed.positions
     shape = len(positions), height, width
     check_fits(shape, np.int32, np.float32)
-    split = draw_joined(placed, sink, options.background) if is_split else None
-    if split is not None:
-        return split
     ids: NDArray[np.int32] = FRESH.empty("ids", shape, np.int32)
     depth: NDArray[np.float32] = FRESH.empty("depth", shape, np.float32)
     planes = zip(ids, depth, positions, strict=True) if width and height else ()
@@ -100,20 +94,6 @@ def draw_groups(placed: Placed, targets: Sequence[SampleTarget], ids: NDArray[np
         np.add(ids, placed.scene.first_ids[i] - 1, out=counted, where=is_new, dtype=np.int64)
         ids[is_new] = 0
     return counted
-
-
-def draw_joined(placed: Placed, sink: Sink, background: float) -> Fragments | None:
-    """Draw several samples of all instances as one mesh; None where that takes planes: clusters, or many meshes."""
-    view = placed.view.but(is_split=True)
-    is_clustered = len(placed.in_parts) > 0 or in_clusters(placed, sink)
-    if is_clustered or len(placed.joined) != 1 or not choices.can_split(view, placed.scene.n_triangles):
-        return None
-    (width, height), positions = view.size, np.array(placed.positions, np.int32)
-    own = SamplePass(FRESH, placed.joined[0], positions, count_parts(placed))
-    split = draw_split(own, sink, (height, width), background)
-    if split is None:
-        refuse_changed()
-    return placed.fragments(split.ids[None], split.depth[None], split)
 
 
 def draw_scene(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool = True) -> None:

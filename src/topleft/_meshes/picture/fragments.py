@@ -20,7 +20,6 @@ from topleft._core.base.cached import cached_property
 from topleft._core.base.memory import empty
 from topleft._core.raster.fragments import Fragments, Viewer, view_of
 from topleft._core.raster.peel import DepthLayers
-from topleft._core.raster.sampling import SplitSamples, split_ranges
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.picture.bend import BentMesh
 from topleft._meshes.picture.shade import ShownInstance
@@ -170,11 +169,10 @@ class SceneFragments(InstanceIds, Fragments):
     _one: Fragments | None = None
 
     def __init__(
-        self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]],
-        split: SplitSamples | None = None,
-    ) -> None:  # fmt: skip
-        """Take drawn planes (S, H, W), or the plane of the first sample and `split`; and where samples lie."""
-        self._planes, self._split = (ids, depth), split
+        self, ids: Ids, depth: NDArray[np.float32], placed: Placed, positions: Sequence[tuple[int, int]]
+    ) -> None:
+        """Take drawn planes (S, H, W), and where samples lie."""
+        self._planes = ids, depth
         self.placed = placed
         self.positions = positions
         self.id, self._depth = placed.whole_ids(ids[0]), depth[0]
@@ -183,7 +181,7 @@ class SceneFragments(InstanceIds, Fragments):
     def of(cls, drawn: Fragments, placed: Placed) -> Self:
         """Return the fragments of a scene from the fragments of all its triangles as one mesh."""
         planes = drawn._planes or (drawn.id[None], drawn.depth[None])
-        frags = cls(*planes, placed, placed.positions, drawn._split)
+        frags = cls(*planes, placed, placed.positions)
         frags._one = drawn if len(placed.scene.first_ids) == 2 else None
         return frags
 
@@ -197,7 +195,7 @@ class SceneFragments(InstanceIds, Fragments):
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes the parts itself: they refer to memory of this one."""
         state = vars(self) | {"_planes": self.drawn_planes}
-        return {name: state[name] for name in state.keys() - {"parts", "_one", "_split", "_meshes", "_visible_meshes"}}
+        return {name: state[name] for name in state.keys() - {"parts", "_one", "_meshes", "_visible_meshes"}}
 
     __setstate__ = set_aligned
 
@@ -241,8 +239,7 @@ class SceneFragments(InstanceIds, Fragments):
     def _visible_meshes(self) -> tuple[tuple[int, engine.SnappedMesh, int], ...]:
         if self._one is not None:
             return tuple(self._one._visible_meshes)
-        seen, first_ids = self._buffers(), self.placed.scene.first_ids
-        ids = seen.ids
+        ids, first_ids = self._buffers().ids, self.placed.scene.first_ids
         width, height = ids.shape[:0:-1]
         if len(first_ids) == 2:  # the only instance may be anywhere
             boxes = np.array([[0, 0, width, height]], np.int32)
@@ -250,9 +247,6 @@ class SceneFragments(InstanceIds, Fragments):
             boxes = np.tile(np.array([width, height, 0, 0], np.int32), (len(first_ids) - 1, 1))
             for plane in ids:
                 find_instances(np.ascontiguousarray(as_aligned(plane)), first_ids, boxes)
-            if seen.split is not None:  # which has the other samples, not where they lie
-                for at in split_ranges(seen.split.rows):
-                    find_instances(np.ascontiguousarray(seen.split.ids[:, at]), first_ids, boxes)
         firsts, sample = first_ids.tolist(), self.positions[0]
 
         def part(i: int) -> NDArray[np.int32]:

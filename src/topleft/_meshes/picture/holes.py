@@ -110,7 +110,7 @@ def draw_solid(
     way = "with holes in its materials" if masks is None else "that something shows through"
     placed.whole.check_counted(f"a scene {way}")
     holed = holed_instances(placed.whole, cuts, placed.camera, placed.bent)
-    solid = draw_ids(memory, placed.with_scene(solid_scene(placed.scene, holed, masks)), is_split=False)
+    solid = draw_ids(memory, placed.with_scene(solid_scene(placed.scene, holed, masks)))
     ids, depth = cast("tuple[I32, F32]", solid.drawn_planes)
     for k, at in enumerate(placed.positions if ids.size and holed else ()):
         cut = np.full_like(ids[k : k + 1], -1)  # apart: at equal depth they hide the others, whatever the index

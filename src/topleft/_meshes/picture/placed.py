@@ -22,7 +22,7 @@ from topleft._core.base.threads import run_parts
 from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import ClusteredMesh
 from topleft._core.raster.rasterize import refuse_many
-from topleft._core.raster.sampling import SplitSamples, sample_positions
+from topleft._core.raster.sampling import sample_positions
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import CULL_CODES, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
@@ -159,9 +159,9 @@ class Placed:
         """Return another scene before the camera, made for this picture alone: no mesh of it is drawn in clusters."""
         return replace(self, scene=scene, may_cluster=False)
 
-    def fragments(self, ids: Ids, depth: NDArray[np.float32], split: SplitSamples | None = None) -> SceneFragments:
-        """Return drawn planes (S, H, W), or the first and `split`, as fragments of the scene or of its only mesh."""
-        return self.kind_of_fragments(ids, depth, self, self.positions, split)
+    def fragments(self, ids: Ids, depth: NDArray[np.float32]) -> SceneFragments:
+        """Return drawn planes (S, H, W) as fragments of the scene or of its only mesh."""
+        return self.kind_of_fragments(ids, depth, self, self.positions)
 
     @property
     def kind_of_fragments(self) -> type[SceneFragments]:

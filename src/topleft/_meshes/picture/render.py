@@ -304,7 +304,7 @@ def rasterize_mesh(
     with shot.memory(rasterizer) as memory:
         placed = Placed.parse(shot, {"cull": cull, "threads": threads, **view})
         options = FragmentOptions.parse(depth_test, background_depth, out)
-        return draw_ids(memory, placed, options, is_split=False)
+        return draw_ids(memory, placed, options)
 
 
 def shade(

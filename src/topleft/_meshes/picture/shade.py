@@ -192,7 +192,7 @@ class Lit:
             if positions is None:
                 self.scene.shade(seen.ids[0], seen.depth[0], *part, at)
             else:
-                self.scene.shade_samples(positions, seen.ids, seen.depth, seen.split, *part)
+                self.scene.shade_samples(positions, seen.ids, seen.depth, *part)
 
         n_threads = min(count_threads(self.options.threads, self.n_triangles), width * height // MIN_PX_PER_THREAD)
         run_parts(shade_rows, height, n_threads)

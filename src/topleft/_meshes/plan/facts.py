@@ -19,7 +19,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, FillRoute, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions, split_bytes
+from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
@@ -106,12 +106,6 @@ class Facts:
     def draws_bands(self) -> bool:
         """Whether each sample is drawn to a separate picture, in bands of rows."""
         return self.draws_planes and not self.in_clusters
-
-    @property
-    def is_split(self) -> bool:
-        """Whether pixels that show a single triangle are stored once for all samples."""
-        can_split = self.verb == "rasterize" and choices.can_split(self.view, self.n_triangles)
-        return can_split and not self.in_clusters
 
     @property
     def in_clusters(self) -> bool:
@@ -278,8 +272,6 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
     elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_large_shapes):
         scratch["labels"] = 4 * n_pixels
-    elif facts.is_split:
-        scratch |= split_bytes(n, (height, width), n_samples, facts.drawing.n_threads)[0]
     elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
         scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
     clusters = facts.clusters
@@ -302,8 +294,6 @@ def result_bytes(facts: Facts) -> dict[str, int]:
     width, height = facts.view.size
     n_pixels, n_samples = width * height, facts.view.sampling.n_samples
     many = facts.view.sampling is Sampling.AREA or n_samples > 1
-    if facts.is_split:
-        return split_bytes(facts.n_triangles, (height, width), n_samples, facts.drawing.n_threads)[1]
     if facts.verb == "rasterize":
         return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
     if facts.verb == "fill":

@@ -318,7 +318,7 @@ def plan(
         detail, vertices, triangles = (stage,), mesh.vertices, mesh.triangles
     elif tolerance:
         raise ValueError("tolerance needs a mesh and a camera in the place of vertices and triangles")
-    checked = replace(View.parse(size, options), is_split=mesh is not None)
+    checked = View.parse(size, options)
     checked.refuse_classic("plan")
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
