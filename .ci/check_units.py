@@ -33,7 +33,6 @@ ALLOWED = {
     "peel_lanes": "as `draw*`",
     "count_spans": "as `draw*`",
     "clear": END,
-    "lay_rows": END,
     "flush_atlas": END,
     "blend_*": "cells at the end of the strip; `has_room` takes blends before it",
     "mix_*": "pixels at the end of the buffer; `has_room` takes blends before it",

@@ -99,9 +99,6 @@ TL_KERNEL(int64_t, bin, const tl_snapped *snapped, const tl_window *window, int3
  * n_bands + 2 numbers.  A first call with listed = NULL sets starts[n_bands + 1] to the length of `listed`. */
 TL_KERNEL(void, list_bins, const tl_bins *bins, int64_t n_bands, int64_t *starts, int32_t *listed)
 
-/* Sets the columns [columns[2 k], columns[2 k + 1]) that the triangles of band k may reach. */
-TL_KERNEL(void, find_columns, const tl_bins *bins, int64_t n_bands, int32_t *columns)
-
 /* Adds up the exact area of each pixel that the triangles of a slice cover, from its `first` on; the window has fewer
  * than 2^31 cells.  Returns as `draw_mesh` does, or TL_AREA_OVERFLOW; the pixels are undefined unless it returns -1. */
 TL_KERNEL(int64_t, draw_area, const tl_snapped *snapped, const tl_window *window, const tl_slice *slice,
@@ -157,9 +154,6 @@ TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const 
 /* Sets the depth of n pixels for triangles that all have one depth: `depth` where there is an id, `background`
  * elsewhere.  Xors the ids with `flip` first. */
 TL_KERNEL(void, set_flat_depth, int32_t *ids, int64_t n, int32_t flip, float depth, float background, float *out)
-
-/* Writes rows of a picture of `width` columns from `to` on, with non-temporal stores. */
-TL_KERNEL(void, lay_rows, const tl_laid_rows *rows, int32_t *to, int64_t width)
 
 /* Writes which of n instances each id belongs to, -1 below 0; instance i has the ids first_ids[i] to first_ids[i + 1] -
  * 1. Widens `boxes`, (n, 4) left, top, right, bottom, or NULL, by the pixels of each instance. */

@@ -276,18 +276,9 @@ typedef struct {
 typedef struct {
     int64_t n;
     int32_t *ids, *first_band, *last_band; /* n_triangles + 16 numbers each */
-    int32_t *first_col, *end_col;          /* and the columns that each may reach; or NULL */
 } tl_bins;
 
 #define TL_MAX_SAMPLES 16 /* of a pixel */
-
-/* Rows of a picture that were drawn in the columns [col0, col0 + n_cols), `stride` numbers apart; elsewhere they are
- * `blank`. */
-typedef struct {
-    const int32_t *drawn;
-    int64_t stride, col0, n_cols, n_rows;
-    int32_t blank;
-} tl_laid_rows;
 
 /* How the samples' colours are averaged: uint8 values are decoded to light and back in 65537 steps, except alpha, after
  * the first n_channels.  With straight alpha colours are weighted by it. */

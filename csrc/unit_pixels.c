@@ -4,7 +4,6 @@
 #include "pixels/composite.c"
 #include "pixels/instances.c"
 #include "pixels/paint.c"
-#include "pixels/lay.c"
 #include "pixels/planes.c"
 #include "pixels/png.c"
 #include "pixels/points.c"

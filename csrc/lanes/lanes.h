@@ -12,7 +12,6 @@
  *   v?_load_some(m, p, has_room)    the lanes in m; with room for a vector other lanes are read, too, or undefined
  *   v?_store_some(p, m, a, has_room)    the lanes in m; with room for a vector other lanes may be written unchanged
  *   vi_gather(m, p, i)      p[i] in the lanes of m; reads p[0], too, where m has lanes; p may be unaligned
- *   vi_stream(p, v)         a non-temporal store to an aligned address; end_stream() after the last store
  *   vi_compress(p, m, v)    the lanes in m, packed, at p; writes a whole vector, and returns how many lanes
  *   vm_first(n)             the first n lanes, none for n <= 0, all for n >= TL_LANES
  *   v4_, vi_load_quads, vi_store_quads    four int32; TL_LANES of them as four vectors, lane k in slot vi_quad_slot(k)

@@ -25,8 +25,6 @@ TL_INLINE vi vi_load(const int32_t *p)
     return a;
 }
 TL_INLINE void vi_store(int32_t *p, vi a) { memcpy(p, &a, sizeof a); }
-TL_INLINE void vi_stream(int32_t *p, vi a) { vi_store(p, a); }
-TL_INLINE void end_stream(void) {}
 TL_INLINE vi vi_iota(void) { return 0; }
 TL_INLINE vi vi_add(vi a, vi b) { return (vi)((uint32_t)a + (uint32_t)b); }
 TL_INLINE vi vi_sub(vi a, vi b) { return (vi)((uint32_t)a - (uint32_t)b); }

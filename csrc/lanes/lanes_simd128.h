@@ -52,8 +52,6 @@ typedef uint64_t v2u_there __attribute__((vector_size(16), aligned(1), may_alias
 TL_INLINE vi vi_set1(int32_t a) { return (vi){a, a, a, a}; }
 TL_INLINE vi vi_load(const int32_t *p) { return *(const vi_there *)p; }
 TL_INLINE void vi_store(int32_t *p, vi a) { *(vi_there *)p = a; }
-TL_INLINE void vi_stream(int32_t *p, vi a) { vi_store(p, a); }
-TL_INLINE void end_stream(void) {}
 TL_INLINE vi vi_iota(void) { return (vi){0, 1, 2, 3}; }
 TL_INLINE vi vi_add(vi a, vi b) { return (vi)((v4u)a + (v4u)b); }
 TL_INLINE vi vi_sub(vi a, vi b) { return (vi)((v4u)a - (v4u)b); }

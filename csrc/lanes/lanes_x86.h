@@ -26,8 +26,6 @@ TL_INLINE vi vi_upper_bytes(vi a) { return TL_MM(srli_epi16)(a, 8); }
 TL_INLINE vi vi_add_bytes(vi a, vi b) { return TL_MM(adds_epu8)(a, b); }
 TL_INLINE vi vi_max_bytes(vi a, vi b) { return TL_MM(max_epu8)(a, b); }
 TL_INLINE vi vi_min_bytes(vi a, vi b) { return TL_MM(min_epu8)(a, b); }
-TL_INLINE void vi_stream(int32_t *p, vi a) { TL_SI(stream)((void *)p, a); }
-TL_INLINE void end_stream(void) { _mm_sfence(); }
 /* Four int32. */
 typedef __m128i v4;
 TL_INLINE v4 v4_zero(void) { return _mm_setzero_si128(); }

@@ -24,13 +24,13 @@ typedef struct {
     int32_t max_extent, left, top, right, bottom;
 } bin_limits;
 
-/* Pixels of the window; empty unless col0 < col1 and row0 < row1. */
+/* Rows of the window; none unless first < end. */
 typedef struct {
-    int64_t col0, col1, row0, row1;
-} bin_box;
+    int64_t first, end;
+} bin_rows;
 
-/* Widens a box by the pixels that a triangle may reach. */
-static void widen_bin(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, bin_box *box)
+/* Widens rows by those that a triangle may reach. */
+static void widen_bin(const bin_limits *b, const tl_vertex_set *set, const int32_t *corners, bin_rows *rows)
 {
     const tl_window *window = b->window;
     const int bits = window->subpixel_bits;
@@ -46,8 +46,7 @@ static void widen_bin(const bin_limits *b, const tl_vertex_set *set, const int32
     const int64_t row1 = min64(((y1 + b->high_fx) >> bits) - window->y_px, window->height);
     if (col0 >= col1 || row0 >= row1)
         return;
-    box->col0 = min64(box->col0, col0), box->col1 = max64(box->col1, col1);
-    box->row0 = min64(box->row0, row0), box->row1 = max64(box->row1, row1);
+    rows->first = min64(rows->first, row0), rows->end = max64(rows->end, row1);
 }
 
 /* Lists triangle i, with all of its pieces, by itself. */
@@ -55,16 +54,14 @@ static __attribute__((noinline)) void bin_alone(const bin_limits *b, int64_t i, 
 {
     int32_t own[3];
     const triangle_parts parts = parts_of(b->snapped, i, own);
-    bin_box box = {b->window->width, 0, b->window->height, 0};
+    bin_rows rows = {b->window->height, 0};
     for (int k = 0; k < parts.n; k++)
-        widen_bin(b, &parts.set, parts.corners + 3 * k, &box);
-    if (box.row0 >= box.row1)
+        widen_bin(b, &parts.set, parts.corners + 3 * k, &rows);
+    if (rows.first >= rows.end)
         return;
     bins->ids[bins->n] = (int32_t)i;
-    bins->first_band[bins->n] = (int32_t)(box.row0 >> b->band_bits);
-    bins->last_band[bins->n] = (int32_t)((box.row1 - 1) >> b->band_bits);
-    if (bins->first_col)
-        bins->first_col[bins->n] = (int32_t)box.col0, bins->end_col[bins->n] = (int32_t)box.col1;
+    bins->first_band[bins->n] = (int32_t)(rows.first >> b->band_bits);
+    bins->last_band[bins->n] = (int32_t)((rows.end - 1) >> b->band_bits);
     bins->n++;
 }
 
@@ -91,10 +88,6 @@ TL_INLINE int bin_batch(const bin_limits *b, int64_t i, const int32_t *corners, 
     vi_compress(bins->ids + bins->n, seen, vi_add(vi_set1((int32_t)i), vi_iota()));
     vi_compress(bins->first_band + bins->n, seen, vi_shift_right(first, b->band_bits));
     vi_compress(bins->last_band + bins->n, seen, vi_shift_right(last, b->band_bits));
-    if (bins->first_col) {
-        vi_compress(bins->first_col + bins->n, seen, vi_sub(col0, vi_set1(b->left)));
-        vi_compress(bins->end_col + bins->n, seen, vi_sub(col1, vi_set1(b->left)));
-    }
     bins->n += __builtin_popcount(vm_bits(seen));
     return 1;
 }
@@ -139,19 +132,6 @@ static void list_bins(const tl_bins *bins, int64_t n_bands, int64_t *starts, int
     for (int64_t i = 0; i < bins->n; i++) /* starts[k + 1] is the next free place of band k */
         for (int32_t k = bins->first_band[i]; k <= bins->last_band[i]; k++)
             listed[starts[k + 1]++] = bins->ids[i];
-}
-
-static void find_columns(const tl_bins *bins, int64_t n_bands, int32_t *columns)
-{
-    for (int64_t k = 0; k < n_bands; k++)
-        columns[2 * k] = INT32_MAX, columns[2 * k + 1] = 0;
-    for (int64_t i = 0; i < bins->n; i++)
-        for (int32_t *at = columns + 2 * bins->first_band[i]; at <= columns + 2 * bins->last_band[i]; at += 2) {
-            at[0] = bins->first_col[i] < at[0] ? bins->first_col[i] : at[0];
-            at[1] = bins->end_col[i] > at[1] ? bins->end_col[i] : at[1];
-        }
-    for (int64_t k = 0; k < n_bands; k++)
-        columns[2 * k] = columns[2 * k] < columns[2 * k + 1] ? columns[2 * k] : columns[2 * k + 1];
 }
 
 #endif

@@ -17,10 +17,9 @@ TESTS = [None, "less", "greater"]
 
 
 @contextmanager
-def bands(*, are_drawn, in_place=False):
-    """Draw in bands of few rows wherever that is possible, or nowhere; in the picture, or in memory of their own."""
+def bands(*, are_drawn):
+    """Draw in bands of few rows wherever that is possible, or nowhere."""
     rows = {"near_pixels": 0 if are_drawn else 1 << 40, "cleared_pixel": 1e6, "plane_bytes": 8 * 333 * 20}
-    rows["far_bytes"] = 1 << 40 if in_place else 0
     with choices.forced(rows_to_blend=lambda view, *_, **__: 13 if are_drawn else view.size[1], **rows):
         yield
 
@@ -40,25 +39,25 @@ def as_arrays(found):
     return [found] if isinstance(found, np.ndarray) else [found.samples_triangle, found.samples_depth]
 
 
-def assert_bands_change_nothing(draw, *, in_place=False):
+def assert_bands_change_nothing(draw):
     """Check that what is drawn at once has the bits of what is drawn in bands; returns its first array."""
-    with bands(are_drawn=False, in_place=True):
+    with bands(are_drawn=False):
         whole = as_arrays(draw())
-    with bands(are_drawn=True, in_place=in_place):
+    with bands(are_drawn=True):
         banded = as_arrays(draw())
     assert [one.tobytes() for one in banded] == [one.tobytes() for one in whole]
     return whole[0]
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize(("threads", "in_place"), [(1, False), (3, False), (3, True)])
+@pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("test", TESTS)
-def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads, in_place):
+def test_ids_and_depth_in_bands_equal_the_whole(isa, test, threads):
     mesh = strewn(1)
     for cull in ("none", "back", "front"):
         draw = partial(tl.rasterize, *mesh, SIZE, depth_test=test, threads=threads, cull=cull)
         with on(isa):
-            assert (assert_bands_change_nothing(draw, in_place=in_place) >= 0).any()
+            assert (assert_bands_change_nothing(draw) >= 0).any()
 
 
 @ON_EACH_ISA
@@ -75,7 +74,7 @@ def test_counts_and_colours_in_bands_equal_the_whole(force, isa):
 
 @ON_EACH_ISA
 @pytest.mark.parametrize("columns", [slice(0, 333), slice(90, 210)])
-def test_samples_in_memory_of_a_band_equal_those_in_place(isa, columns):
+def test_samples_in_bands_equal_the_whole(isa, columns):
     vertices, triangles = strewn(5, 150, 25.0)
     vertices[:, 0] = vertices[:, 0] % (columns.stop - columns.start) + columns.start
     for sampling, test in (("msaa2", "less"), ("msaa4", "greater"), ("msaa8", None)):

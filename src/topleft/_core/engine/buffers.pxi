@@ -136,7 +136,6 @@ cdef class Target:
     """The contiguous buffers of a picture, neither side of it 0, and the sink of its covered samples."""
 
     cdef readonly int sink
-    cdef readonly int64_t n_bytes  # of pixels and depth
     cdef int64_t width, height
     cdef int pixel_bytes
     cdef uint8_t[::1] pixels
@@ -152,7 +151,6 @@ cdef class Target:
         """`bounds`: `bounds_shape` float32: large triangles and clusters that lie behind them are skipped."""
         self.sink, self.flip, self.bounds = sink, TL_FLIP if earlier_wins else 0, bounds
         self.height, self.width = pixels.shape
-        self.n_bytes = pixels.nbytes + (0 if depth is None else depth.nbytes)
         self.pixel_bytes = pixels.itemsize
         self.pixels, self.depth, self.covered = as_bytes(pixels), depth, covered
         self.samples, self.sample_bits = samples, 0 if samples is None else len(samples).bit_length() - 1

@@ -365,33 +365,23 @@ cdef class Bins:
     cdef tl_bins bins
     cdef int64_t[::1] starts
     cdef int32_t[::1] listed
-    cdef int32_t[:, ::1] columns
     cdef object room
     cdef readonly int band_bits
     cdef readonly int64_t bad_row, n_bands, n_listed
 
     def __init__(self, SnappedMesh mesh, int64_t height, int64_t width, int32_t reach_fx, int band_bits,
                  int32_t[:, ::1] room):
-        """`room`: (3, n_triangles + 16), or (5, n_triangles + 16) for the columns of each band, too.
-
-        `bad_row` is -1, or a triangle has an index outside the vertices.
-        """
+        """`room`: (3, n_triangles + 16). `bad_row` is -1, or a triangle has an index outside the vertices."""
         cdef tl_window window = mesh.window(0, height, width)
         self.room, self.band_bits, self.n_bands = room, band_bits, (height + (1 << band_bits) - 1) >> band_bits
         self.starts = np.empty(self.n_bands + 2, np.int64)
         self.bins.n = self.n_listed = 0
         self.bins.ids, self.bins.first_band, self.bins.last_band = &room[0, 0], &room[1, 0], &room[2, 0]
-        self.bins.first_col = self.bins.end_col = NULL
-        if room.shape[0] == 5:
-            self.bins.first_col, self.bins.end_col = &room[3, 0], &room[4, 0]
-            self.columns = np.empty((self.n_bands, 2), np.int32)
         with nogil:
             self.bad_row = K.bin(&mesh.snapped, &window, reach_fx, band_bits, &self.bins)
             if self.bad_row < 0:
                 K.list_bins(&self.bins, self.n_bands, &self.starts[0], NULL)
                 self.n_listed = self.starts[self.n_bands + 1]
-                if self.bins.first_col != NULL and self.n_bands:
-                    K.find_columns(&self.bins, self.n_bands, &self.columns[0, 0])
 
     def fill(self, int32_t[::1] listed):
         """Sort the triangles into `listed`, which has room for `n_listed` + 1."""
@@ -414,48 +404,24 @@ cdef class Bins:
         return ids
 
 
-def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], int32_t[:, ::1] room or None, Bins bins,
-               int64_t first_band, int64_t end_band):
-    """Clear and draw bands of several pictures, a mesh each: a band of all pictures before the next band.
-
-    `room`: a buffer for the ids and depth of a band, (2, rows * (W + 16)), that stays in the cache and is copied by
-    streaming stores; `bins` hold the columns of each band. None: bands are drawn in place.
-    """
+def draw_bands(meshes: Sequence[SnappedMesh], targets: Sequence[Target], Bins bins, int64_t first_band, int64_t end_band):
+    """Clear and draw bands of several pictures, a mesh each: a band of all pictures before the next band."""
     cdef SnappedMesh mesh
     cdef Target target
-    cdef tl_target rows, near
+    cdef tl_target rows
     cdef tl_window window
-    cdef tl_laid_rows laid
     cdef tl_slice slice = no_slice()
     cdef int64_t band, first_row
-    cdef float farthest
     cdef list pairs = list(zip(meshes, targets, strict=True))
     slice.is_first = slice.is_last = True
     for band in range(first_band, end_band):
         first_row = band << bins.band_bits
         bins.take(&slice, band)
         for mesh, target in pairs:
-            rows = near = target.rows(first_row)
+            rows = target.rows(first_row)
             window = mesh.window(first_row, min(<int64_t>1 << bins.band_bits, target.height - first_row), target.width)
-            if room is None:
-                with nogil:
-                    K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
-                continue
-            laid.col0, laid.n_cols = bins.columns[band, 0], bins.columns[band, 1] - bins.columns[band, 0]
-            laid.n_rows, laid.stride = window.height, (laid.n_cols + 15) & ~<int64_t>15
-            window.x_px, window.width = window.x_px + laid.col0, laid.n_cols
-            near.pixels, near.stride_px = &room[0, 0], laid.stride
-            near.depth = <float *>&room[1, 0] if rows.depth != NULL else NULL
-            farthest = -INFINITY if rows.sink == TL_SINK_FARTHEST else INFINITY
             with nogil:
-                if laid.n_cols:
-                    K.draw_mesh(&mesh.snapped, &window, &near, &slice)
-                laid.drawn, laid.blank = &room[0, 0], 0 if rows.sink == TL_SINK_COUNT else -1
-                K.lay_rows(&laid, <int32_t *>rows.pixels, target.width)
-                if rows.depth != NULL:
-                    laid.drawn = &room[1, 0]
-                    memcpy(&laid.blank, &farthest, sizeof(float))
-                    K.lay_rows(&laid, <int32_t *>rows.depth, target.width)
+                K.draw_mesh(&mesh.snapped, &window, &rows, &slice)
         raise_if_given_up()
 
 

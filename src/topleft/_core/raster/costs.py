@@ -73,12 +73,6 @@ class Costs:
     blended_strip: float = row(1000.0, "ns", "by area, a triangle that reaches into a band", "the same")
     blend_bytes: float = row(768 << 10, "bytes", "a band of colours", "the same")
     plane_bytes: float = row(512 << 10, "bytes", "a band of ids and depth of one sample", STUDY)
-    far_bytes: float = row(
-        16 << 20,
-        "bytes",
-        "buffers that bands are written to past the caches",
-        "msaa4, 1,500 of 70 px, 800x800: 5.3 -> 3.8 ms",
-    )
     label_bytes: float = row(512 << 10, "bytes", "labels of all samples in a band", STUDY)
     label_planes: float = row(
         8 << 20, "bytes", "labels of all samples of a picture, past the cache", "fill by msaa4 and 8, 3 to 300 px"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,11 +51,11 @@ class SamplePass(NamedTuple):
         """The mesh as each sample sees it."""
         return [self.mesh.at_sample(x, y) for x, y in self.positions.tolist()]
 
-    def sort_bands(self, shape: tuple[int, int], n_pixels: int, *, with_columns: bool = False) -> engine.Bins:
+    def sort_bands(self, shape: tuple[int, int], n_pixels: int) -> engine.Bins:
         """Return the triangles of each band of up to `n_pixels`; none when an index lies outside the vertices."""
         height, width = shape
         band_bits = bits_of_bands(shape, n_pixels, self.n_threads)
-        room = self.memory.scratch("bins", (5 if with_columns else 3, self.mesh.n_triangles + 16), np.int32)
+        room = self.memory.scratch("bins", (3, self.mesh.n_triangles + 16), np.int32)
         bins = engine.Bins(self.mesh, height, width, int(np.abs(self.positions).max()), band_bits, room)
         if bins.bad_row < 0:
             bins.fill(self.memory.scratch("bands", (bins.n_listed + 1,), np.int32))
@@ -87,37 +88,22 @@ def draw_each(own: SamplePass, targets: list[engine.Target], shape: tuple[int, i
 def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int, int]) -> bool:
     """Draw each sample into its target, band after band of rows; returns as `draw_planes` does. The mesh is near.
 
-    Where all targets have so many bytes that they do not stay in a cache, a band is drawn in memory that does. A
-    picture of one band is drawn whole.
+    A picture of one band is drawn whole.
     """
-    costs = cost_table()
-    if own.n_threads == 1 and 8 * shape[0] * shape[1] <= costs.plane_bytes:
+    plane_bytes = int(cost_table().plane_bytes)
+    if own.n_threads == 1 and 8 * shape[0] * shape[1] <= plane_bytes:
         return draw_each(own, targets, shape)
-    is_far = sum(target.n_bytes for target in targets) > costs.far_bytes
-    bins = own.sort_bands(shape, int(costs.plane_bytes) // 8, with_columns=is_far)
+    bins = own.sort_bands(shape, plane_bytes // 8)
     if bins.bad_row >= 0:
         return True
-    meshes, n_parts = own.meshes, max(1, min(own.n_threads, bins.n_bands))
-    rooms: list[NDArray[np.int32] | None] = [None] * n_parts
-    if is_far:
-        rooms = list(own.memory.scratch("band rows", (n_parts, 2, (shape[1] + 16) << bins.band_bits), np.int32))
-
-    def draw_part(first: int, end: int) -> None:
-        engine.draw_bands(meshes, targets, rooms.pop(), bins, first, end)
-
-    run_parts(draw_part, bins.n_bands, n_parts)
+    draw_part = partial(engine.draw_bands, own.meshes, targets, bins)
+    run_parts(draw_part, bins.n_bands, max(1, min(own.n_threads, bins.n_bands)))
     return False
 
 
-def band_bytes(n_triangles: int, shape: tuple[int, int], n_bytes: int, n_threads: int) -> dict[str, int]:
+def band_bytes(n_triangles: int) -> dict[str, int]:
     """Return the most bytes of scratch that `draw_sorted` needs, by name."""
-    costs, (height, width) = cost_table(), shape
-    is_far = n_bytes > costs.far_bytes
-    found = {"bins": (20 if is_far else 12) * (n_triangles + 16), "bands": 4 * (n_triangles + 1)}
-    if is_far:
-        band_bits = bits_of_bands(shape, int(costs.plane_bytes) // 8, n_threads)
-        found["band rows"] = 8 * min(n_threads, -(-height >> band_bits)) * ((width + 16) << band_bits)
-    return found
+    return {"bins": 12 * (n_triangles + 16), "bands": 4 * (n_triangles + 1)}
 
 
 def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, background: float) -> None:

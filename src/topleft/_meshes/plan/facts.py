@@ -273,7 +273,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
     elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_large_shapes):
         scratch["labels"] = 4 * n_pixels
     elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
-        scratch |= band_bytes(n, (height, width), sum(results.values()), facts.drawing.n_threads)
+        scratch |= band_bytes(n)
     clusters = facts.clusters
     if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
         rows, segments = engine.Target.bounds_shape(height, width)
@@ -282,8 +282,7 @@ def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
         scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
         scratch["clusters"] = 12 * len(clusters.clusters) + 4 * facts.drawing.n_threads * n + clusters.clusters.n_bytes
     elif facts.in_bands:
-        n_bytes = 0 if view.sampling is Sampling.AREA else sum(results.values())
-        scratch |= band_bytes(n, (height, width), n_bytes, facts.drawing.n_threads)
+        scratch |= band_bytes(n)
     elif facts.is_sliced:
         scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
     return scratch, results
