@@ -79,8 +79,7 @@ typedef struct {
     /* the light is the grey of srgb.c: line and root per channel */
     int is_grey;
     float grey_line[3], grey_root[3];
-    int has_far_texels; /* some texels are prefetched */
-    int is_plain;       /* runs need only edge functions and normals of vertices */
+    int is_plain; /* runs need only edge functions and normals of vertices */
     int n_runs, n_special;
     float max_min_length;   /* the largest RUN_SHORTEST of plain runs; INFINITY where runs are not plain */
     int first_run[TL_SPAN]; /* of each vector: the slot after the runs that begin before it */

@@ -15,7 +15,6 @@
 #include "pixels/shading.h"
 #include "pixels/weights.c"
 #include "shade/light.c"
-#include "shade/prefetch.c"
 #include "shade/shade_pixels.c"
 #include "shade/span_list.c"
 #include "shade/srgb.c"
@@ -68,17 +67,15 @@ TL_INLINE void start_span(int32_t *pixels, int32_t word, int n, const int32_t *i
 TL_INLINE void shade_runs_of(const shade_runs *s, int n, int64_t column, int64_t row, const float *depth,
                              int32_t *pixels)
 {
-    started_span span;
     if (s->is_grey) {
         shade_grey(s, n, column, pixels);
         return;
     }
-    span.next = 0;
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         vf rgba[4];
         if (!s->visible[i])
             continue;
-        light_pixels(&span, s, i, (n + TL_LANES - 1) / TL_LANES, column, row, depth + x, rgba);
+        light_pixels(s, i, column, row, depth + x, rgba);
         put_shaded(pixels + x, s->visible[i], n - x, encode_light(s->shading, rgba));
     }
 }

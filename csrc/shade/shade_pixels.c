@@ -4,6 +4,7 @@
 #define TL_SHADE_PIXELS_C
 
 #include <math.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "topleft.h"
@@ -252,20 +253,23 @@ TL_INLINE vf in_eye_space(const shaded_lanes *p, int axis)
     return dot3(row, p->normal);
 }
 
-/* The light and opacity of pixels after `start_lanes`; `laid` holds the texels of a texture, or `as` is NULL.  `depth`
- * points to the first pixel; it is read only without perspective. */
-TL_INLINE void shade_pixels(shaded_lanes *p, laid_texture *laid, int64_t row, const float *depth, vf *rgba)
+/* The light and the opacity of vector i of the span that begins at `column`; some pixel of it is visible.  `depth`
+ * points to its first pixel; it is read only without perspective. */
+TL_INLINE void light_pixels(const shade_runs *s, int i, int64_t column, int64_t row, const float *depth, vf *rgba)
 {
-    const shade_runs *s = p->s;
     const tl_shading *shading = s->shading;
     const vf zero = vf_set1(0.0f), half = vf_set1(0.5f);
-    p->opacity = vf_set1(1.0f);
+    shaded_lanes p;
+    laid_texture laid;
+    start_lanes(&p, s, i, column);
+    laid.as = NULL;
+    p.opacity = vf_set1(1.0f);
     if (s->needs_normal)
-        set_normals(p);
+        set_normals(&p);
     if (shading->show == TL_SHOW_NORMALS) {
         for (int axis = 0; axis < 3; axis++)
-            rgba[axis] = vf_fma(vf_set1(127.5f), in_eye_space(p, axis), vf_set1(127.5f));
-        rgba[3] = p->opacity;
+            rgba[axis] = vf_fma(vf_set1(127.5f), in_eye_space(&p, axis), vf_set1(127.5f));
+        rgba[3] = p.opacity;
         return;
     }
     for (int c = 0; c < 3; c++)
@@ -273,23 +277,23 @@ TL_INLINE void shade_pixels(shaded_lanes *p, laid_texture *laid, int64_t row, co
     if (shading->show == TL_SHOW_MATCAP) {
         vf texel[4];
         const vf none[2] = {zero, zero};
-        sample_texture(shading->matcap, vf_fma(half, in_eye_space(p, 0), half), vf_fma(half, in_eye_space(p, 1), half),
-                       none, none, texel, 3);
+        const vf u = vf_fma(half, in_eye_space(&p, 0), half), v = vf_fma(half, in_eye_space(&p, 1), half);
+        sample_texture(shading->matcap, u, v, none, none, texel, 3);
         for (int c = 0; c < 3; c++)
             rgba[c] = texel[c];
     } else {
         if (s->needs_colors)
-            set_colors(p);
+            set_colors(&p);
         if (s->needs_point)
-            set_points(p, row, depth);
+            set_points(&p, row, depth);
         if (shading->material_of)
-            shade_materials(p, laid, rgba);
+            shade_materials(&p, &laid, rgba);
         else
-            shade_material(p, shading->materials, laid, rgba);
+            shade_material(&p, shading->materials, &laid, rgba);
     }
     if (shading->fog_scale != 0.0f)
-        fade(p, depth, rgba);
-    rgba[3] = p->opacity;
+        fade(&p, depth, rgba);
+    rgba[3] = p.opacity;
 }
 
 #endif

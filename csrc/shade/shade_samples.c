@@ -13,7 +13,7 @@
 #include "vertex/fixed.h"
 #include "pixels/runs.c"
 #include "pixels/shading.h"
-#include "shade/prefetch.c"
+#include "shade/shade_pixels.c"
 #include "shade/shade.c"
 #include "shade/span_list.c"
 #include "shade/srgb.c"
@@ -55,15 +55,13 @@ TL_INLINE void add_samples(sample_sums *sums, const shade_runs *s, int first, in
                            const float *depth)
 {
     const vf zero = vf_set1(0.0f), most = vf_set1(s->shading->show == TL_SHOW_NORMALS ? 255.0f : 1.0f);
-    started_span span;
-    span.next = 0;
     for (int x = 0, i = 0; x < n; x += TL_LANES, i++) {
         if (!s->visible[i])
             continue;
         const vm visible = vm_from_bits(s->visible[i]);
         const int at = first + x;
         vf rgba[4];
-        light_pixels(&span, s, i, (n + TL_LANES - 1) / TL_LANES, column, row, depth + x, rgba);
+        light_pixels(s, i, column, row, depth + x, rgba);
         const vf weight = vf_select(visible, vf_load(sums->n_seen + at), zero);
         for (int c = 0; c < 3; c++) {
             const vf shown = vf_select(visible, vf_min(vf_max(rgba[c], zero), most), zero);

@@ -12,7 +12,6 @@
 #include "pixels/runs.c"
 #include "pixels/shading.h"
 #include "shade/full.c"
-#include "shade/prefetch.c"
 #include "shade/srgb.c"
 
 /* Adds what a full material needs of runs. */
@@ -65,7 +64,6 @@ static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading 
     s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
     s->is_plain = s->needs_normal && !s->needs_q && !shading->face_normals && !shading->normal_of_corner &&
                   !shading->finds_inverse_w && s->window->subpixel_bits > 0;
-    note_far(s);
     start_grey(s);
 }
 
