@@ -40,7 +40,6 @@
  *   vf_store_pairs, vf_store_triples    consecutive pixels of two or three numbers
  *   vi_load_records(base, scale, i, c)    16 bytes at base + scale * i[k], as columns; i are unsigned
  *   vf_load_pairs(base, i, c)    8 bytes at base + 8 * i[k], as columns
- *   vi_load_rows(base, i, c)    16 bytes at base + 8 * i[k], as columns
  *   vi_mul_halves, vi_mul_high_halves    lower and upper halves of the products of unsigned 16-bit halves
  *   vi_scale_halves(a, b)   (a * b + 2^14) >> 15 of signed 16-bit halves; b = -2^15 is -1
  *   vi_add_halves, vi_sub_halves    modulo 2^16

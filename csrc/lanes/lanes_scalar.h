@@ -274,10 +274,6 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
 {
     memcpy(c, (const char *)base + (int64_t)*i * scale, 16);
 }
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    memcpy(c, (const char *)base + 8 * (uint64_t)(uint32_t)*i, 16);
-}
 TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 {
     memcpy(c, (const char *)base + (int64_t)*i * 8, 8);

@@ -592,7 +592,6 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
         rows[k] = *(const vi_there *)((const char *)base + (uint64_t)(uint32_t)i[k] * (uint64_t)scale);
     transpose_quads(rows, c);
 }
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c) { vi_load_records(base, 8, i, c); }
 TL_INLINE void vf_load_pairs(const void *base, const int32_t *i, vf *c)
 {
     double pair[4];

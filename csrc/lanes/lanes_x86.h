@@ -170,11 +170,6 @@ TL_INLINE void vi_load_records(const void *base, int scale, const int32_t *i, vi
     load_four_quarters(base, scale, 1, i, rows);
     transpose_quads(rows, c);
 }
-TL_INLINE void vi_load_rows(const void *base, const int32_t *i, vi *c)
-{
-    __asm__("" : "+r"(i)); /* else GCC keeps the address of each lane's index, in more registers than exist */
-    vi_load_records(base, 8, i, c);
-}
 TL_INLINE void columns_of_rows_f32(const float *p, int stride, vf *columns)
 {
     vi rows[4], c[4];

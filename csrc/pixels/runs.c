@@ -79,9 +79,7 @@ typedef struct {
     /* the light is the grey of srgb.c: line and root per channel */
     int is_grey;
     float grey_line[3], grey_root[3];
-    int is_plain; /* runs need only edge functions and normals of vertices */
     int n_runs, n_special;
-    float max_min_length;   /* the largest RUN_SHORTEST of plain runs; INFINITY where runs are not plain */
     int first_run[TL_SPAN]; /* of each vector: the slot after the runs that begin before it */
     unsigned starts[TL_SPAN], visible[TL_SPAN];
     /* aligned: a vector across two cache lines takes twice as long */
@@ -558,26 +556,15 @@ static void set_special(shade_runs *s, int slot, int lane, int64_t row, run_setu
     }
 }
 
-/* The sample of column 0 of a row. */
-typedef struct {
-    vi x_fx, y_fx;
-    int bits;
-} run_origin;
-
-TL_INLINE run_origin origin_of_runs(const shade_runs *s, int64_t row)
+/* Sets edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: sums that wrap there are
+ * right at the pixel.  Returns the runs that are special; RUN_SUM is the area. */
+TL_INLINE vm find_edges(shade_runs *s, int slot, int64_t row, vi *x, vi *y, vf *col_step, vf *row_step)
 {
     const tl_vertex_set *set = &s->snapped->mesh;
     const int bits = s->window->subpixel_bits;
     const int32_t half = (1 << bits) >> 1;
-    return (run_origin){vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx),
-                        vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx), bits};
-}
-
-/* Sets edge functions of TL_LANES runs in a row, from their corners, at column 0 of the row: sums that wrap there are
- * right at the pixel.  Returns the runs that are special; RUN_SUM is the area. */
-TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x, vi *y, vf *col_step, vf *row_step)
-{
-    const int bits = origin->bits;
+    const vi x_fx = vi_set1((int32_t)((uint32_t)s->window->x_px << bits) + half + set->sample_x_fx);
+    const vi y_fx = vi_set1((int32_t)((uint32_t)(row + s->window->y_px) << bits) + half + set->sample_y_fx);
     vm is_special = bits == 0 ? vm_all() : vm_first(0);
     for (int k = 0; k < 3; k++)
         is_special = vm_or(is_special, vi_eq(x[k], vi_set1(TL_SPECIAL)));
@@ -585,7 +572,7 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x
     const vf height = vf_from_vi(vi_sub(vi_max(y[0], vi_max(y[1], y[2])), vi_min(y[0], vi_min(y[1], y[2]))));
     is_special = vm_or(is_special, vf_ge(vf_mul(width, height), vf_set1(TL_INT32_BOX)));
     for (int k = 0; k < 3; k++)
-        x[k] = vi_sub(x[k], origin->x_fx), y[k] = vi_sub(y[k], origin->y_fx);
+        x[k] = vi_sub(x[k], x_fx), y[k] = vi_sub(y[k], y_fx);
     vi sum = vi_set1(0);
     for (int k = 0; k < 3; k++) {
         const int a = k == 2 ? 0 : k + 1, b = 3 - k - a;
@@ -602,19 +589,19 @@ TL_INLINE vm find_edges(shade_runs *s, int slot, const run_origin *origin, vi *x
     return is_special;
 }
 
-/* Loads the corners of TL_LANES runs in pixels; `corners` are indices times 2^shift. */
-TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *corners, int shift, vd *x, vd *y)
+/* Loads corners of TL_LANES runs in pixels. */
+TL_INLINE void load_exact_corners(const tl_exact_points *points, const int32_t *corners, vd *x, vd *y)
 {
     if (points->stride == TL_PLACED) {
         vd c[4];
-        vd_load_records(points->points, TL_PLACED >> shift, corners, c);
+        vd_load_records(points->points, TL_PLACED, corners, c);
         *x = c[0], *y = c[1];
         return;
     }
     double lanes[2][TL_MAX_LANES];
     for (int lane = 0; lane < TL_LANES; lane++)
         for (int axis = 0; axis < 2; axis++)
-            lanes[axis][lane] = points->points[(int64_t)(corners[lane] >> shift) * points->stride + axis];
+            lanes[axis][lane] = points->points[(int64_t)corners[lane] * points->stride + axis];
     *x = vd_load(lanes[0]), *y = vd_load(lanes[1]);
 }
 
@@ -688,36 +675,41 @@ TL_INLINE vm set_edges(shade_runs *s, int slot, int64_t row, run_setup *r)
     if (set->exact) {
         vd x_px[3], y_px[3];
         for (int k = 0; k < 3; k++)
-            load_exact_corners(set->exact, r->corners[k], 0, &x_px[k], &y_px[k]);
+            load_exact_corners(set->exact, r->corners[k], &x_px[k], &y_px[k]);
         return find_exact_edges(s, slot, row, x_px, y_px, r->col_step, r->row_step, &r->area);
     }
     for (int k = 0; k < 3; k++) {
         vz z;
         load_vertices_by(1, set->vertices, r->corners[k], &x[k], &y[k], &z);
     }
-    const run_origin origin = origin_of_runs(s, row);
-    const vm is_special = find_edges(s, slot, &origin, x, y, r->col_step, r->row_step);
+    const vm is_special = find_edges(s, slot, row, x, y, r->col_step, r->row_step);
     r->area = vf_from_vi(vi_load(s->ints[RUN_SUM] + slot));
     return is_special;
 }
 
-/* Stores the corners of all runs, times 2^shift.  This is a pass by itself because a vector load stalls on numbers that
- * were just stored one by one. */
-TL_INLINE void keep_corners(shade_runs *s, int shift)
+/* Stores the corners of all runs.  This is a pass by itself because a vector load stalls on numbers that were just
+ * stored one by one. */
+TL_INLINE void keep_corners(shade_runs *s)
 {
     for (int slot = TL_LANES; slot < TL_LANES + s->n_runs; slot += TL_LANES) {
         vi corners[3];
         run_corners(s, slot, corners);
         for (int k = 0; k < 3; k++)
-            vi_store(s->corners[k] + slot, vi_shift_left(corners[k], shift));
+            vi_store(s->corners[k] + slot, corners[k]);
     }
 }
 
 /* Sets edge functions and attributes of the runs of a row, a vector of runs at a time. */
-TL_INLINE void set_any_runs(shade_runs *s, int64_t row)
+TL_ONCE void set_runs(shade_runs *s, int64_t row)
 {
+    const tl_shading *shading = s->shading;
     const int end = TL_LANES + s->n_runs;
-    keep_corners(s, 0);
+    s->n_special = 0;
+    if (!s->n_runs)
+        return;
+    /* fills the last vector with a valid triangle */
+    vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
+    keep_corners(s);
     for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
         run_setup r;
         for (int k = 0; k < 3; k++)
@@ -729,88 +721,6 @@ TL_INLINE void set_any_runs(shade_runs *s, int64_t row)
             set_special(s, slot, __builtin_ctz(rest), row, &r);
         set_attributes(s, slot, &r);
     }
-}
-
-/* Loads corner k of TL_LANES runs.  Compilers leave a loop over three corners rolled, with x and y in memory. */
-TL_INLINE void load_plain_corner(const shade_runs *s, int slot, int k, vi *x, vi *y)
-{
-    vi c[4];
-    vi_load_rows(s->snapped->mesh.vertices, s->corners[k] + slot, c);
-    x[k] = c[0], y[k] = c[1];
-}
-
-/* Loads normal and q of corner k of TL_LANES runs. */
-TL_INLINE vf load_plain_normal(const shade_runs *s, int slot, int k, vf *normal)
-{
-    vi c[4];
-    vi_load_rows(s->shading->normals, s->corners[k] + slot, c);
-    for (int axis = 0; axis < 3; axis++)
-        normal[axis] = vf_of_bits(c[axis]);
-    return vf_of_bits(c[3]);
-}
-
-TL_INLINE float largest_lane(vf a)
-{
-    float lanes[TL_MAX_LANES], most;
-    vf_store(lanes, a);
-    most = lanes[0];
-    for (int lane = 1; lane < TL_LANES; lane++)
-        most = most < lanes[lane] ? lanes[lane] : most;
-    return most;
-}
-
-/* Sets up runs that need only normals of vertices; 0 if a run is special.  The passes are short, so that several
- * vectors of runs overlap. */
-TL_INLINE int set_plain_runs(shade_runs *s, int64_t row, int is_exact)
-{
-    const int end = TL_LANES + s->n_runs;
-    const run_origin origin = origin_of_runs(s, row);
-    vm is_special = vm_first(0);
-    vf most = vf_set1(0.0f);
-    keep_corners(s, 1);
-    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        vi x[3], y[3];
-        vf col_step[3], row_step[3];
-        if (is_exact) {
-            vd x_px[3], y_px[3];
-            vf area;
-            for (int k = 0; k < 3; k++)
-                load_exact_corners(s->snapped->mesh.exact, s->corners[k] + slot, 1, &x_px[k], &y_px[k]);
-            is_special = vm_or(is_special, find_exact_edges(s, slot, row, x_px, y_px, col_step, row_step, &area));
-            continue;
-        }
-        load_plain_corner(s, slot, 0, x, y);
-        load_plain_corner(s, slot, 1, x, y);
-        load_plain_corner(s, slot, 2, x, y);
-        is_special = vm_or(is_special, find_edges(s, slot, &origin, x, y, col_step, row_step));
-    }
-    if (vm_any(is_special))
-        return 0;
-    for (int slot = TL_LANES; slot < end; slot += TL_LANES) {
-        vf q[3], normal[3][3];
-        q[0] = load_plain_normal(s, slot, 0, normal[0]);
-        q[1] = load_plain_normal(s, slot, 1, normal[1]);
-        q[2] = load_plain_normal(s, slot, 2, normal[2]);
-        put_normals(s, slot, vf_from_vi(vi_load(s->ints[RUN_SUM] + slot)), q, (const vf(*)[3])normal);
-        most = vf_max(most, vf_load(s->floats[RUN_SHORTEST] + slot));
-    }
-    s->max_min_length = largest_lane(most);
-    return 1;
-}
-
-/* Sets up the runs of a row. */
-TL_ONCE void set_runs(shade_runs *s, int64_t row)
-{
-    const tl_shading *shading = s->shading;
-    const int end = TL_LANES + s->n_runs, is_exact = s->snapped->mesh.exact != NULL;
-    s->n_special = 0;
-    s->max_min_length = INFINITY;
-    if (!s->n_runs)
-        return;
-    /* fills the last vector with a valid triangle */
-    vi_store(s->ints[RUN_ID] + end, vi_set1(s->ints[RUN_ID][end - 1]));
-    if (!s->is_plain || !(is_exact ? set_plain_runs(s, row, 1) : set_plain_runs(s, row, 0)))
-        set_any_runs(s, row);
     if (shading->material_of)
         for (int slot = TL_LANES; slot < end; slot++)
             s->ints[RUN_MATERIAL][slot] = shading->material_of[s->ints[RUN_ID][slot]];

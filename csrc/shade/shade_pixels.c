@@ -108,8 +108,6 @@ TL_INLINE vm find_normals(shaded_lanes *p)
     const vf squared = dot3(p->normal, p->normal), scale = vf_div(vf_set1(1.0f), vf_sqrt(squared));
     for (int axis = 0; axis < 3; axis++)
         p->normal[axis] = vf_mul(p->normal[axis], scale);
-    if (!vm_any(vf_ge(vf_set1(p->s->max_min_length), squared)))
-        return vm_first(0);
     return vm_and(p->visible, vf_ge(pick(p, RUN_SHORTEST), squared));
 }
 

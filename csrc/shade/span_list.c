@@ -62,8 +62,6 @@ static void set_mesh(shade_runs *s, const tl_snapped *snapped, const tl_shading 
     s->needs_point = shows_light && ((is_lit && has_points) || shines);
     s->needs_more = s->needs_uv1 || s->needs_alpha || s->needs_tangents[0] || s->needs_tangents[1];
     s->needs_q = s->needs_uv || s->needs_more || s->needs_colors || s->needs_point || shading->fog_scale != 0.0f;
-    s->is_plain = s->needs_normal && !s->needs_q && !shading->face_normals && !shading->normal_of_corner &&
-                  !shading->finds_inverse_w && s->window->subpixel_bits > 0;
     start_grey(s);
 }
 

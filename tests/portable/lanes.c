@@ -324,7 +324,7 @@ static void test_columns(void)
                          out_f + 3 * N + 4 * i < out_f + 4 * ROOM - 64 ? out_f + 3 * N + 4 * i : out_f);
         vi_load_records(b_f, 12, a_i + i, q);
         vi_store(out_i + i, vi_xor(vi_xor(q[0], q[1]), vi_xor(q[2], vi_shift_left(q[3], 3))));
-        vi_load_rows(b_f, a_i + i, q);
+        vi_load_records(b_f, 8, a_i + i, q);
         vf_load_pairs(b_f, a_i + i, c);
         vi_store(out_i + N + i, vi_xor(vi_xor(q[0], vi_shift_left(q[1], 1)), vi_xor(vi_shift_left(q[2], 2), q[3])));
         vi_store(out_i + 2 * N + i, vi_xor(vi_bits_of_vf(c[0]), vi_shift_left(vi_bits_of_vf(c[1]), 1)));
