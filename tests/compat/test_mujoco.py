@@ -235,6 +235,16 @@ def test_geoms_that_change_their_look_are_drawn_anew(renderer):
     assert_same(renderer.render(), before)
 
 
+def test_flex_is_drawn_where_it_is_now(renderer):
+    scene = renderer.scene
+    scene.geoms, scene.ngeom = [geom(shapes.FLEX, (0, 0, 0), (0, 0, 0), (1, 0, 0, 1), 0)], 1
+    scene.flexfaceadr, scene.flexfaceused = [0], [1]
+    scene.flexface, scene.flexnormal = np.array([-1, -1, 0, 1, -1, 0, 0, 1, 0], F), np.array([0, 0, 1] * 3, F)
+    before = renderer.render()
+    scene.flexface[::3] += 1
+    assert not np.array_equal(before, renderer.render())
+
+
 def test_plane_shows_through_from_below(renderer):
     renderer.scene.camera = [eye((0, 0, -5), (0, 0, 1), (0, 1, 0))] * 2
     renderer.scene.geoms[2].pos[:] = 0.8, 0, 1  # not in the plane

@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from toolchain import FLAGS_OF_ISA, compiler
 
+from topleft._core.base.options import Sink
+from topleft.methods import METHODS
+
 CSRC = Path(__file__).resolve().parents[2] / "csrc"
 FILES = sorted(path.relative_to(CSRC).as_posix() for path in CSRC.rglob("*.[ch]"))
 FOLDERS = sorted({name.rpartition("/")[0] for name in FILES})
@@ -126,6 +129,12 @@ def test_program_compiles_with_what_the_headers_declare(name):
     )
     result = check_syntax(CSRC.parent / name, flags)
     assert result.returncode == 0, result.stderr
+
+
+def test_numbers_of_python_are_those_of_the_header():
+    numbers = {name: int(n) for name, n in re.findall(r"TL_(\w+) = (\d+)[, ]", text_of("topleft.h"))}
+    assert {f"SINK_{sink.name}": sink.value for sink in Sink}.items() <= numbers.items()
+    assert {f"METHOD_{name.upper()}": method.code for name, method in METHODS.items()}.items() <= numbers.items()
 
 
 def test_map_lists_the_folders():

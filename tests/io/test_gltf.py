@@ -583,6 +583,7 @@ def test_gltf_many_instances_stop_at_max_vertices(tmp_path):
     (tmp_path / "a.glb").write_bytes(file.glb())
     with pytest.raises(MeshError, match="has 33 vertices, more than the 30 of max_vertices"):
         tl.load(tmp_path / "a.glb", max_vertices=30)
+    assert len(tl.load(tmp_path / "a.glb", max_vertices=60).vertices) == 60
 
 
 # Cameras

@@ -178,11 +178,13 @@ def test_mtl_map_options_place_the_texture(load, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.png", "a b.png", "a -s 2.png"])
-@pytest.mark.parametrize("behind", ["-s 2 3 -clamp on", "-clamp on  -s 2 3 1 -mm 0.0 1.0 -cc off"])
-def test_mtl_map_options_may_stand_behind_the_name(load, tmp_path, name, behind):
+@pytest.mark.parametrize(
+    ("behind", "at"), [("-s 2 3 -o 0 0.25 -clamp on", 0.25), ("-clamp on  -s 2 3 1 -mm 0.0 1.0 -cc off", 0)]
+)
+def test_mtl_map_options_may_stand_behind_the_name(load, tmp_path, name, behind, at):
     picture(tmp_path, name, np.zeros((2, 2, 3)))
     texture = material_of(load, f"map_Kd {name} {behind}\n").texture
-    assert (texture.transform.tolist(), texture.wrap) == ([[2, 0, 0], [0, 3, 0]], ("clamp", "clamp"))
+    assert (texture.transform.tolist(), texture.wrap) == ([[2, 0, 0], [0, 3, at]], ("clamp", "clamp"))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])

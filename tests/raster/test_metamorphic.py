@@ -114,6 +114,14 @@ def test_edge_and_scanline_give_every_buffer_alike(make):
         assert_same_buffers(buffers(scene), expected)
 
 
+@ON_EACH_ISA
+@pytest.mark.parametrize("method", ["auto", "edge", "scanline"])
+def test_least_triangle_covers_the_sample_in_its_corner(method, isa):
+    with on(isa):
+        drawn = tl.overdraw(np.array([[128, 128], [129, 128], [128, 129]]) / 256, [[0, 1, 2]], (1, 1), method=method)
+    assert drawn.tolist() == [[1]]
+
+
 @MAKERS
 def test_threads_give_every_buffer_alike(make):
     for scene, _ in scenes_of(make, 3):

@@ -67,6 +67,16 @@ def test_as_mesh_of_trimesh_takes_colors_and_known_normals():
     assert mesh.normals == pytest.approx(-VERTICES / np.linalg.norm(VERTICES, axis=1)[:, None])
 
 
+def test_as_mesh_of_trimesh_takes_factors_that_are_shares():
+    trimesh = pytest.importorskip("trimesh")
+    kind = type("Material", (trimesh.visual.material.PBRMaterial,), {"baseColorFactor": None})  # theirs makes bytes
+    theirs, material = trimesh.Trimesh(VERTICES, TRIANGLES, process=False), kind(alphaMode="BLEND")
+    material.baseColorFactor = [1.0, 0.25, 0.0, 0.5]
+    theirs.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(VERTICES), 2)), material=material)
+    (found,) = as_mesh(theirs).materials
+    assert (found.color, found.opacity) == ((255, 137, 0), 0.5)
+
+
 def test_render_of_a_trimesh_scene_places_its_parts():
     trimesh = pytest.importorskip("trimesh")
     scene = trimesh.Scene()

@@ -228,11 +228,12 @@ def test_texture_of_a_mipmap_is_the_loop(boundary):
 
 def test_texture_of_the_nearest_level_is_that_level():
     tex, uv = random(1, 8, 8, 1), random(1, 1, 4, 2, seed=1)
-    level = torch.tensor([[[-1.0, 0.4, 0.6, 9.0]]])
-    out = dr.texture(tex, uv, mip_level_bias=level, filter_mode="linear-mipmap-nearest", max_mip_level=2)
+    given = {"mip_level_bias": torch.tensor([[[-1.0, 0.4, 0.6, 9.0]]]), "max_mip_level": 2}
+    out = dr.texture(tex, uv, filter_mode="linear-mipmap-nearest", **given)
     levels = reference.halvings(tex[0].numpy())
     expected = [reference.linear(levels[k], *uv[0, 0, j].tolist(), "wrap") for j, k in enumerate((0, 0, 1, 2))]
     np.testing.assert_allclose(out[0, 0].numpy(), expected, atol=1e-12)
+    assert torch.equal(dr.texture(tex, uv, **given), dr.texture(tex, uv, filter_mode="linear-mipmap-linear", **given))
 
 
 def test_texture_takes_levels_that_are_made_before():
