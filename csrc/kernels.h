@@ -423,10 +423,12 @@ TL_KERNEL(void, add_taken, const tl_taken *taken, const float *positions, const 
 /* Rows [first, end) of the lowest visible height above the ground; NaN without ground, or too far away. */
 TL_KERNEL(void, view_heights, const tl_terrain *terrain, int64_t first, int64_t end, double *out)
 
-/* Columns of tl_crossings.  `fill_columns` fills them by the even-odd rule in place, and returns the number of columns
- * with an odd count.  `expand_columns` writes a byte for each voxel, `count_columns` a share, n_steps a column;
- * `scatter_columns` each bit at strides of a row, a column and a step. */
-TL_KERNEL(int64_t, fill_columns, uint64_t *bits, int64_t n_columns, int64_t n_words)
+/* Columns of tl_crossings.  `fill_columns` fills them by the even-odd rule in place, returns the number of columns with
+ * an odd count, and adds those with winding numbers other than 0 and 1, and than 0 and -1, to n_nested (2).
+ * `expand_columns` writes a byte for each voxel, `count_columns` a share, n_steps a column; `scatter_columns` each bit
+ * at strides of a row, a column and a step. */
+TL_KERNEL(int64_t, fill_columns, uint64_t *bits, const uint64_t *twos, int64_t n_columns, int64_t n_words,
+          int64_t *n_nested)
 TL_KERNEL(void, expand_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps, uint8_t *out)
 TL_KERNEL(void, count_columns, const uint64_t *bits, int64_t n_columns, int64_t n_words, int64_t n_steps,
           int sample_bits, float *out)

@@ -181,7 +181,9 @@ typedef struct {
  * step. */
 typedef struct {
     uint64_t *bits; /* n_words of 64 a sample, more bits than n_steps */
+    uint64_t *twos; /* with the bits the sum modulo 4 of 1 for each front and -1 for each back; or NULL */
     int64_t n_words;
+    int is_back; /* only backs are drawn, else fronts; read with twos */
     int n_steps;
     int is_set;
 } tl_crossings;

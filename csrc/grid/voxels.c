@@ -16,11 +16,28 @@
 #include "polygons/row_bits.c"
 #include "vertex/corners.h"
 
+/* Whether the winding numbers along a column leave 0 and 1 (bit 0), and 0 and -1 (bit 1). */
+static int nesting_of(const uint64_t *bits, const uint64_t *twos, int64_t n_words)
+{
+    int winding = 0, found = 0;
+    for (int64_t k = 0; k < n_words; k++)
+        for (uint64_t rest = bits[k] | twos[k]; rest; rest &= rest - 1) {
+            const uint64_t bit = rest & -rest;
+            if (!(bits[k] & bit)) /* two fronts or two backs in one step */
+                return 3;
+            winding += twos[k] & bit ? -1 : 1;
+            found |= (winding < 0 || winding > 1) | (winding < -1 || winding > 0) << 1;
+        }
+    return found;
+}
+
 /* A column with an odd number of crossings loses its last crossing. */
-static int64_t fill_columns(uint64_t *bits, int64_t n_columns, int64_t n_words)
+static int64_t fill_columns(uint64_t *bits, const uint64_t *twos, int64_t n_columns, int64_t n_words, int64_t *n_nested)
 {
     int64_t n_odd = 0;
-    for (int64_t i = 0; i < n_columns; i++, bits += n_words) {
+    for (int64_t i = 0; i < n_columns; i++, bits += n_words, twos += n_words) {
+        const int nesting = nesting_of(bits, twos, n_words);
+        n_nested[0] += nesting & 1, n_nested[1] += nesting >> 1;
         uint64_t parity = 0, any = 0;
         for (int64_t k = 0; k < n_words; k++)
             parity ^= bits[k], any |= bits[k];

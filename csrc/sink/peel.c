@@ -38,7 +38,10 @@ TL_INLINE void note_crossing(const tl_crossings *c, int64_t at, float depth)
     const float end = (float)c->n_steps, z = c->is_set ? floorf(depth) : ceilf(depth - 0.5f);
     const int is_step = z >= 0.0f && z < end;
     const int64_t step = is_step ? (int64_t)z : z < 0.0f ? 0 : c->n_steps;
-    uint64_t *const word = c->bits + at * c->n_words + (step >> 6);
+    const int64_t i = at * c->n_words + (step >> 6);
+    uint64_t *const word = c->bits + i;
+    if (c->twos)
+        c->twos[i] ^= (c->is_back ? ~*word : *word) & 1ull << (step & 63);
     if (!c->is_set)
         *word ^= 1ull << (step & 63);
     else if (is_step)

@@ -169,6 +169,39 @@ def test_overlaps_of_shells_are_told(scale, shift, is_inside_out, n_told, sample
     assert [str(one.message).split()[0] for one in told] == [str(n_told * samples**2)] * bool(n_told)
 
 
+def boxes(*corners):
+    """One mesh of boxes, from lower and upper corners."""
+    vertices, triangles = tl.scenes.cube()
+    both = [low + (vertices + 1) / 2 * (np.array(high) - low) for low, high in corners]
+    return tl.Mesh(np.concatenate(both), np.concatenate([triangles + len(vertices) * i for i in range(len(both))]))
+
+
+@pytest.mark.parametrize("shape", [16, 33, 64])
+@pytest.mark.parametrize(
+    ("mesh", "is_told"),
+    [
+        (boxes(((0, 0, 0), (2, 2, 2)), ((1, 1, 0), (3, 3, 1))), True),  # on one floor
+        (boxes(((0, 0, 0), (2, 2, 2)), ((0, 0, 0), (2, 2, 2))), True),
+        (boxes(((0, 0, 0), (2, 2, 2)), ((0, 0, 2), (3, 3, 3))), False),  # one on the other
+        (boxes(((0, 0, 0), (2, 2, 0.01)), ((0, 0, 0.015), (2, 2, 0.02))), False),  # both in one voxel
+    ],
+)
+def test_shells_that_meet_in_a_voxel_are_told_if_they_overlap(mesh, is_told, shape):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        tl.voxelize(mesh, shape)
+    assert len(told) == is_told
+
+
+@pytest.mark.parametrize("shape", [64, 100, 128, 256])
+def test_one_shell_does_not_overlap(shape):
+    vertices, triangles = tl.scenes.icosphere(6)
+    x, y, z = vertices.T[:, :, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tl.voxelize((vertices * (1 + 0.2 * np.sin(9 * x) * np.sin(8 * y) * np.sin(10 * z)), triangles), shape)
+
+
 def test_scene_is_filled_where_any_of_its_instances_is():
     cube, aside = tl.Mesh(*tl.scenes.cube()), np.eye(4)
     aside[0, 3] = 1.0

@@ -6,10 +6,11 @@ def column_words(int64_t n_steps) -> int:
     return n_steps // 64 + 1
 
 
-def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, bint is_set, int64_t first,
-                   int64_t end) -> int:
+def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, uint64_t[:, :, ::1] twos or None, int64_t n_steps,
+                   bint is_set, int64_t first, int64_t end) -> int:
     """Store the crossings of rows [first, end) of columns (H, W, column_words): `tl_crossings`.
 
+    With `twos` fronts are drawn, then backs.
     Returns as `SnappedMesh.draw` does.
     """
     cdef tl_crossings crossings
@@ -18,28 +19,39 @@ def draw_crossings(SnappedMesh mesh, uint64_t[:, :, ::1] bits, int64_t n_steps, 
     cdef tl_window window = mesh.window(first, end - first, bits.shape[1])
     cdef tl_slice slice = no_slice()
     cdef int64_t bad_row
+    cdef tl_snapped snapped = mesh.snapped
     if end <= first or not bits.shape[1]:
         return -1
     memset(&target, 0, sizeof(target))
     memset(&peeled, 0, sizeof(peeled))
+    memset(&crossings, 0, sizeof(crossings))
     crossings.bits, crossings.n_words = &bits[first, 0, 0], bits.shape[2]
     crossings.n_steps, crossings.is_set = n_steps, is_set
     peeled.crossings = &crossings
     target.sink, target.stride_px, target.peeled = <tl_sink>TL_SINK_PEEL, bits.shape[1], &peeled
     slice.end = mesh.snapped.n_triangles
+    if twos is not None:
+        crossings.twos, snapped.cull = &twos[first, 0, 0], TL_CULL_BACK
     with nogil:
-        bad_row = K.draw_mesh(&mesh.snapped, &window, &target, &slice)
+        bad_row = K.draw_mesh(&snapped, &window, &target, &slice)
+        if crossings.twos and bad_row < 0:
+            crossings.is_back, snapped.cull = 1, TL_CULL_FRONT
+            bad_row = K.draw_mesh(&snapped, &window, &target, &slice)
     raise_if_given_up()
     return bad_row
 
 
-def fill_columns(uint64_t[:, :, ::1] bits, int64_t first, int64_t end) -> int:
-    """The kernel `fill_columns`."""
+def fill_columns(uint64_t[:, :, ::1] bits, const uint64_t[:, :, ::1] twos, int64_t first,
+                 int64_t end) -> tuple[int, int, int]:
+    """The kernel `fill_columns`: how many columns are odd, and nested of either way."""
     cdef int64_t n_odd = 0
+    cdef int64_t[2] n_nested
+    n_nested[0], n_nested[1] = 0, 0
     if end > first and bits.shape[1]:
         with nogil:
-            n_odd = K.fill_columns(&bits[first, 0, 0], (end - first) * bits.shape[1], bits.shape[2])
-    return n_odd
+            n_odd = K.fill_columns(&bits[first, 0, 0], &twos[first, 0, 0], (end - first) * bits.shape[1], bits.shape[2],
+                                   n_nested)
+    return n_odd, n_nested[0], n_nested[1]
 
 
 def expand_columns(const uint64_t[:, :, ::1] bits, uint8_t[:, :, ::1] out, int64_t first, int64_t end):

@@ -30,7 +30,7 @@ from topleft._core.raster.view import View
 from topleft._meshes.model.normals import moved
 from topleft._meshes.scene.scene import Scene, as_meshes, scene_of
 from topleft.errors import MeshWarning
-from topleft.typing import CullOption, VoxelRuleOption
+from topleft.typing import VoxelRuleOption
 
 SAMPLES = (1, 2, 4, 8)
 MOST_ALONG = 1 << 14
@@ -39,9 +39,6 @@ MOST_ALONG = 1 << 14
 BYTES_OF_PART = COLUMNS_OF_PART = 1 << 22
 """A part takes 15 ms at most: bytes of arrays, of which shares of samples take longest; columns of voxels of triangles
 whose boxes fill the grid."""
-
-WORDS_AT_ONCE = 1 << 15
-"""Words of columns that are compared together: they stay in a cache."""
 
 U64 = npt.NDArray[np.uint64]
 
@@ -287,11 +284,11 @@ def solid_bits(
     for vertices, triangles in bodies:
         points = grid.to_voxels(vertices, samples)
         name = "columns of one" if union is not None else "columns"
-        shape = tuple(samples * n for n in grid.shape)
-        bits, n = crossings(name, points, triangles, shape, n_threads, fills=True)
-        fronts, _ = crossings("columns of fronts", points, triangles, shape, n_threads, fills=False, cull="back")
+        bits, n, of_fronts, of_backs = filled_columns(
+            name, points, triangles, tuple(samples * n for n in grid.shape), n_threads
+        )
         n_odd += n
-        n_nested += 0 if n else count_nested(bits, fronts)
+        n_nested += 0 if n else min(of_fronts, of_backs)  # bodies may be inside out
         if union is None:
             union = bits
         else:
@@ -315,49 +312,45 @@ def in_parts(work: Callable[[int, int], Part], rows: npt.NDArray[Any], n_threads
     return run_parts(work, len(rows), n_parts_of(rows, n_threads), n_threads)
 
 
-def count_nested(bits: U64, fronts: U64) -> int:
-    """How many columns enter a body where they are inside, or leave it there: the fewer, as bodies may be inside out.
+def filled_columns(
+    name: str, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int
+) -> tuple[U64, int, int, int]:
+    """Bits of the columns along the last axis of a grid, filled between crossings; how many are odd.
 
-    bits: of the columns, filled by parity; fronts: of the crossings of triangles seen from the front.
+    And in how many the winding number leaves 0 and 1, and 0 and -1.
     """
-    n_enter = n_leave = 0
-    n_rows = max(1, WORDS_AT_ONCE // max(1, bits[:1].size))
-    for first in range(0, len(bits), n_rows):
-        now, front = bits[first : first + n_rows], fronts[first : first + n_rows]
-        changed = now << np.uint64(1)
-        changed[..., 1:] |= now[..., :-1] >> np.uint64(63)
-        changed ^= now
-        changed &= front
-        n_enter += int((changed & now).any(axis=-1).sum())
-        n_leave += int((changed & ~now).any(axis=-1).sum())
-    return min(n_enter, n_leave)
+    bits, twos = empty_columns(name, shape, n_threads), empty_columns("turns of columns", shape, n_threads)
+    draw_crossings(bits, twos, points, triangles, shape, n_threads)
+    counts = in_parts(partial(engine.fill_columns, bits, twos), bits, n_threads)
+    n_odd, of_fronts, of_backs = map(sum, zip(*counts, strict=True))
+    return bits, n_odd, of_fronts, of_backs
 
 
-def crossings(
-    name: str, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int, *, fills: bool,
-    cull: CullOption = "none",
-) -> tuple[U64, int]:  # fmt: skip
-    """Bits of the columns along the last axis of a grid: filled between crossings, or only the steps of crossings.
-
-    Of the triangles that are left by `cull`: the steps at which they change the bits that are filled.
-    """
+def empty_columns(name: str, shape: tuple[int, ...], n_threads: int) -> U64:
+    """Bits of the columns along the last axis of a grid, all 0."""
     n_rows, n_columns, n_steps = shape
     size = (n_rows, n_columns, engine.column_words(n_steps))
     check_fits(size, np.uint64)
     bits: U64 = SCRATCH.empty(name, size, np.uint64)
-    is_set = not fills and cull == "none"  # the steps of crossings as they lie, not as they are filled from
-    view = View.parse((n_columns, n_rows), {"threads": n_threads, "cull": cull})
+    in_parts(lambda first, end: bits[first:end].fill(0), bits, n_threads)
+    return bits
+
+
+def draw_crossings(
+    bits: U64, twos: U64 | None, points: F64, triangles: I32, shape: tuple[int, ...], n_threads: int
+) -> None:
+    """Note the crossings of columns: with `twos` the steps that are filled from them, else those in which they lie."""
+    n_rows, n_columns, n_steps = shape
+    view = View.parse((n_columns, n_rows), {"threads": n_threads})
     seen = np.empty_like(points)
     seen[:, 0], seen[:, 1], seen[:, 2] = points[:, 1], points[:, 0], points[:, 2]
     snapped = snap_mesh(SCRATCH, seen, triangles, view, with_depth=True, out=None)
 
     def draw_rows(first: int, end: int) -> None:
-        if engine.draw_crossings(snapped.mesh, bits, n_steps, is_set, first, end) >= 0:
+        if engine.draw_crossings(snapped.mesh, bits, twos, n_steps, twos is None, first, end) >= 0:
             snapped.refuse()
 
-    in_parts(lambda first, end: bits[first:end].fill(0), bits, n_threads)
     run_parts(draw_rows, n_rows, n_threads)
-    return bits, sum(in_parts(partial(engine.fill_columns, bits), bits, n_threads)) if fills else 0
 
 
 def mark_surface(points: F64, triangles: I32, filled: U8, n_threads: int) -> None:
@@ -366,7 +359,8 @@ def mark_surface(points: F64, triangles: I32, filled: U8, n_threads: int) -> Non
     for axis in range(3):
         order = [(axis + 1) % 3, (axis + 2) % 3, axis]
         shape = tuple(filled.shape[k] for k in order)
-        bits, _ = crossings("columns", np.ascontiguousarray(points[:, order]), triangles, shape, n_threads, fills=False)
+        bits = empty_columns("columns", shape, n_threads)
+        draw_crossings(bits, None, np.ascontiguousarray(points[:, order]), triangles, shape, n_threads)
         row, column, step = (filled.strides[k] for k in order)
         in_parts(partial(scatter_rows, bits, flat, (row, column, step)), bits, 1)
 
