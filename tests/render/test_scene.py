@@ -210,7 +210,7 @@ def test_mesh_has_one_instance():
 @pytest.mark.parametrize(
     ("transform", "message"),
     [
-        (np.eye(3), r"transform must have shape \(4, 4\), got \(3, 3\)"),
+        (np.eye(3), r"transform must be \(4, 4\), \(3, 4\), \(R, t\), .*, got shape \(3, 3\)"),
         (np.full((4, 4), np.nan), "transform must hold finite numbers, got"),
         (np.ones((4, 4)), r"the last row of transform must be \[0, 0, 0, 1\], got \[1\.0, 1\.0, 1\.0, 1\.0\]"),
         (np.diag([1, 1, 0, 1]), "transform must not be singular, got"),
