@@ -1,1 +1,1 @@
-"""Time beside error of every method, peer and pure twin; docs/measured/accuracy.md and speed.md."""
+"""Time beside error of every method, peer and pure twin; docs/measured/accuracy.md."""

@@ -211,7 +211,6 @@ CHARTS: Mapping[str, Callable[[dict[str, Any]], Figure]] = {
     "accuracy-antialiasing": chart_antialiasing,
     "accuracy-depth": speed_charts.chart_depth,
     "speed-sizes": speed_charts.chart_sizes,
-    "speed-scaling": speed_charts.chart_scaling,
     "speed-tutorial": speed_charts.chart_tutorial,
 }
 """By the name of the file."""

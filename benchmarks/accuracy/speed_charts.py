@@ -1,4 +1,4 @@
-"""Charts (c) to (f) of an accuracy record: depth, cost by size, by number and threads, pictures a second.
+"""Charts (c) to (e) of an accuracy record: depth, time by size, pictures a second.
 
 Needs matplotlib.
 """
@@ -22,9 +22,6 @@ FORMAT_LOOKS = {
     "float32 arithmetic": ("#009E73", ":", "v", "float32, and calculated in float32"),
     "16-bit integer": ("#999999", "-", "D", "16-bit integer"),
 }
-SERIES = [
-    ("#000000", "o", "-"), ("#0072B2", "s", "--"), ("#D55E00", "^", ":"), ("#009E73", "v", "-."), ("#CC79A7", "D", "-")
-]  # fmt: skip
 
 
 def chart_depth(record: Record) -> Figure:
@@ -79,31 +76,8 @@ def chart_sizes(record: Record) -> Figure:
     return figure
 
 
-def chart_scaling(record: Record) -> Figure:
-    """Return chart (e): time by number of triangles for each number of threads, and how much faster threads are."""
-    counts = sorted({row["threads"] for row in record["scaling"]})
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(4.6, 6.4), layout="constrained")
-    for (color, marker, line), n in zip(SERIES, counts, strict=False):
-        rows = [row for row in record["scaling"] if row["threads"] == n]
-        numbers = [row["n_triangles"] for row in rows]
-        label = f"{n} thread{'s' * (n > 1)}"
-        upper.plot(numbers, [1e6 * row["ms"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
-        if n > 1:
-            lower.plot(numbers, [row["faster"] for row in rows], color=color, marker=marker, ls=line, ms=5, label=label)
-    upper.set(xscale="log", yscale="log", xlabel="triangles", ylabel="time of a picture, 1920x1080")
-    upper.yaxis.set_major_formatter(lambda value, _: duration(value))
-    upper.legend(loc="upper left", fontsize=8.5)
-    lower.set(xscale="log", ylim=(0, max(counts) * 1.08), xlabel="triangles", ylabel="times as fast as one thread")
-    for n in counts:
-        lower.axhline(n, color="0.6", lw=0.8, ls=":")
-    lower.legend(loc="lower right", fontsize=8.5)
-    for axis in (upper, lower):
-        draw_grid(axis)
-    return figure
-
-
 def chart_tutorial(record: Record) -> Figure:
-    """Return chart (f): pictures of eleven triangles a second, fills alone, and by calls."""
+    """Return chart (e): pictures of eleven triangles a second, fills alone, and by calls."""
     rows = sorted(record["tutorial"], key=lambda row: row["fills"])
     figure, axis = plt.subplots(figsize=(4.6, 0.25 * len(rows) + 2.1), layout="constrained")
     for i, row in enumerate(rows):

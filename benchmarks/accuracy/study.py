@@ -102,20 +102,11 @@ def text_of(rows: Callable[..., Any], *more: Any) -> Callable[[Record], str]:
 
 PARTS: Mapping[str, Callable[[Record], str]] = {
     "facts": tables.facts_text,
-    "coverage": text_of(tables.coverage_rows, tables.is_default),
-    "bits": text_of(tables.bits_rows),
-    "no-snap": text_of(tables.no_snap_rows),
-    "others": text_of(tables.others_rows),
-    "skipped": tables.skipped_text,
+    "coverage": text_of(tables.coverage_rows, tables.is_shown),
+    "others": text_of(tables.others_rows, ("peers",)),
     "changes": tables.changes_text,
-    "stability": text_of(tables.stability_rows, tables.is_default),
-    "antialiasing": text_of(tables.antialiasing_rows),
-    "depth": text_of(speed_tables.depth_rows),
-    "speed-facts": speed_tables.speed_facts_text,
-    "sizes": text_of(speed_tables.sizes_rows),
-    "memory": speed_tables.memory_text,
+    "stability": text_of(tables.stability_rows, tables.is_shown),
     "scaling": text_of(speed_tables.scaling_rows),
-    "tutorial": text_of(speed_tables.tutorial_rows),
     "tutorial-ratio": speed_tables.tutorial_text,
 }
 """The parts of a page by their markers `<!-- table: NAME -->`."""
@@ -126,13 +117,10 @@ def lines(record: Record) -> Iterator[str]:
     yield tables.machine_text(record)
     for title, needs, rows in (
         ("Time and error", "coverage", partial(tables.coverage_rows, record, lambda _: True)),
-        ("Peers and pure twins", "peers", partial(tables.others_rows, record)),
+        ("Peers and pure twins", "peers", partial(tables.others_rows, record, ("peers", "pure"))),
         ("Mesh: per million edge pixels", "stability", partial(tables.stability_rows, record, lambda _: True)),
         ("Anti-aliasing", "antialiasing", partial(tables.antialiasing_rows, record)),
-        ("Depth: sheets told apart", "depth", partial(speed_tables.depth_rows, record)),
-        ("Time by area, ns a triangle", "sizes", partial(speed_tables.sizes_rows, record)),
         ("Time by number and threads", "scaling", partial(speed_tables.scaling_rows, record)),
-        ("Pictures a second", "tutorial", partial(speed_tables.tutorial_rows, record)),
     ):
         if needs in record:
             yield from ("", f"## {title}", "", *table(*rows()))

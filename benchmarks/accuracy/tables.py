@@ -9,7 +9,6 @@ from benchmarks.accuracy.stability import CHANGES, EXACT, FAR_PX
 from benchmarks.harness.records import Record
 from benchmarks.harness.turns import digits
 from benchmarks.report.tables import commit_text, number
-from benchmarks.scenes.families import NO_SNAP
 
 DEFAULT_BITS = "8"
 
@@ -18,7 +17,7 @@ Table = tuple[list[str], list[list[str]]]
 
 
 def facts_text(record: Record) -> str:
-    """The origin of the figures of charts (a) and (b) and of the mesh."""
+    """The origin of the figures, and the peers that did not take part."""
     options, mesh = record["options"], record["mesh"]
     families = "; ".join(
         f"{family['name']}, {family['what']}: {family['n_timed']:,} timed, errors over {family['n_edge_px']:,} "
@@ -28,7 +27,7 @@ def facts_text(record: Record) -> str:
     return (
         f"{machine_text(record)}; CPU time of one thread, {options['rounds']} rounds. "
         f"Frame {options['frame_px']} px square. Triangles {families}. "
-        f"Mesh: {mesh['n_triangles']:,} triangles, {mesh['n_edge_px']:,} edge pixels."
+        f"Mesh: {mesh['n_triangles']:,} triangles, {mesh['n_edge_px']:,} edge pixels." + skipped_text(record)
     )
 
 
@@ -48,9 +47,10 @@ def commits_text(record: Record) -> str:
     return f"{', '.join(commits)}, {' to '.join(sorted({part['date'][:10] for part in parts}))}"
 
 
-def is_default(row: Row) -> bool:
-    """Whether it is a method at its usual precision."""
-    return not row["precision"].isdigit() or row["precision"] == DEFAULT_BITS
+def is_shown(row: Row) -> bool:
+    """Tell whether pages show it: a method at its usual precision; of variants the one in float64 alone."""
+    is_usual = not row["precision"].isdigit() or row["precision"] == DEFAULT_BITS
+    return is_usual and ("/" not in row["method"] or row["precision"] == "float64")
 
 
 def family_rows(record: Record, head: list[str], rows: Iterable[tuple[str, str, Row, str]], error: str) -> Table:
@@ -69,12 +69,13 @@ def coverage_rows(record: Record, keep: Callable[[Row], bool]) -> Table:
     return family_rows(record, ["method", "precision"], rows, "wrong")
 
 
-def others_rows(record: Record) -> Table:
-    """A row for each peer and each pure twin: time and error of every family."""
+def others_rows(record: Record, parts: Iterable[str]) -> Table:
+    """A row for each peer or pure twin of these parts: time and error of every family."""
     rows = (
         (row.get("peer") or row["twin"], row.get("gives") or f"counts, Python, as `{row['method']}`", row,
          wrong_text(record, row))
-        for row in record["peers"] + record["pure"]
+        for part in parts
+        for row in record[part]
         if "skipped" not in row
     )  # fmt: skip
     return family_rows(record, ["drawn by", "gives"], rows, "wrong")
@@ -106,31 +107,6 @@ def with_no_snap(record: Record) -> list[Row]:
     return record["coverage"] + rows
 
 
-def no_snap_rows(record: Record) -> Table:
-    """A row for each family: wrong pixels of vertices that are not snapped, and time beside the snapped call."""
-    rows = [
-        [row["family"], f"{row['n_edge_px']:,}", f"{row['wrong_px']:,}"]
-        + [f"{row[key]:.2f}" for key in ("times_8_bits", "q1", "q3")]
-        for row in record.get("no_snap", ())
-    ]
-    return ["family", "edge pixels", "wrong", "time beside 8 bits", "quartile", "quartile"], rows
-
-
-def bits_rows(record: Record) -> tuple[list[str], list[list[str]]]:
-    """Wrong pixels of the engine by sub-pixel bits, beside whole pixels and floats."""
-    head = ["vertices", "as drawn by", *(family["name"] for family in record["families"])]
-    n_edge_px = {family["name"]: family["n_edge_px"] for family in record["families"]}
-    shown = {"auto": "{} bits", "point_in_triangle/top-left": "{}", "float_barycentric": "{}",
-             "float_barycentric/float64": "{}"}  # fmt: skip
-    cells: dict[str, list[str]] = {}
-    for row in with_no_snap(record):
-        if row["method"] in shown:
-            name = shown[row["method"]].format(row["precision"]) if row["precision"] != NO_SNAP else "not snapped"
-            own = cells.setdefault(name, [name, f"`{row['method']}`"])
-            own.append(per_million(row["wrong_px"], n_edge_px[row["family"]]))
-    return head, list(cells.values())
-
-
 def stability_rows(record: Record, keep: Callable[[Row], bool]) -> tuple[list[str], list[list[str]]]:
     """A row for the exact picture, and one for each method and precision."""
     columns = ["missed", "overdrawn", "far_missed", "far_overdrawn", "wrong", *(change.name for change in CHANGES)]
@@ -148,7 +124,7 @@ def skipped_text(record: Record) -> str:
     """Peers that did not take part, with the reason."""
     rows = [row for row in record["peers"] + record["antialiasing"] if "skipped" in row]
     skipped = dict.fromkeys(f"{row['peer']} ({row['skipped']})" for row in rows)
-    return f"Left out: {'; '.join(skipped)}." if skipped else "No program was missing."
+    return f" Left out: {'; '.join(skipped)}." if skipped else ""
 
 
 def changes_text(_: Record) -> str:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from benchmarks.atlas.depth import DEPTH_FAMILIES
+from benchmarks.atlas.maps import Faults
 from benchmarks.atlas.measure import SAMPLED
 from benchmarks.harness.records import Record
-from benchmarks.report.tables import left_table, table_text
+from benchmarks.report.tables import left_table
 from topleft._apps.explore.race import PRODUCTION
-from topleft.failure_scenes import FAILURE_SCENES
 
 Row = dict[str, Any]
 
@@ -34,16 +34,6 @@ def steps_of(facts: Row) -> list[str]:
     return names
 
 
-def families_text(record: Record) -> str:
-    """The families of scenes."""
-    rows = []
-    for facts in record["families"]:
-        axes = "; ".join(f"{what}: {values[0]} to {values[-1]}" for what, values in facts["axes"].items())
-        n = f"{min(facts['n_px']):,} to {max(facts['n_px']):,}"
-        rows.append([f"`{facts['name']}`", facts["what"], axes, str(facts["n_scenes"]), n])
-    return left_table(["family", "what", "parameter, from mild to harsh", "scenes a step", "pixels"], rows)
-
-
 def first_text(record: Record) -> str:
     """Where each method first leaves gaps, overdraws, shows wrong triangles, and refuses."""
     flat = [facts for facts in record["families"] if facts["name"] not in DEPTH_FAMILIES]
@@ -56,7 +46,7 @@ def first_text(record: Record) -> str:
             own = cells.setdefault(row["entry"], [f"`{row['entry']}`"])
             own.append(first_cell(row, steps_of(facts)))
     head = ["method", *(f"`{facts['name']}`" for facts in families)]
-    return left_table(head, list(cells.values()))
+    return left_table(head, merge_methods(cells.values()))
 
 
 def first_cell(row: Row, steps: list[str]) -> str:
@@ -72,36 +62,43 @@ def first_cell(row: Row, steps: list[str]) -> str:
     return ", ".join(found) or NEVER
 
 
-def production_text(record: Record) -> str:
-    """The errors of the engine on every family: the worst of all steps."""
+def merge_methods(rows: Iterable[list[str]]) -> list[list[str]]:
+    """Put methods with the same cells into one row."""
+    names: dict[tuple[str, ...], list[str]] = {}
+    for name, *own in rows:
+        names.setdefault(tuple(own), []).append(name)
+    return [[", ".join(same), *own] for own, same in names.items()]
+
+
+def families_text(record: Record) -> str:
+    """A row for each family: its parameter, and the worst step of the engine."""
     rows = []
     for facts in record["families"]:
-        for row in (
-            row
-            for row in record["maps"]
-            if row["family"] == facts["name"] and row["entry"] in PRODUCTION and row["entry"] != COARSE
-        ):
-            steps, wrong = steps_of(facts), row["wrong"]
-            worst = max((i for i, n in enumerate(wrong) if n is not None), key=lambda i: wrong[i] / facts["n_px"][i])
-            share = f"{percent(wrong[worst], facts['n_px'][worst])}" + (f" at {steps[worst]}" if wrong[worst] else "")
-            refused = next((steps[i] for i, n in enumerate(wrong) if n is None), NEVER)
-            sums = [str(sum(n for n in row[field] if n)) for field in ("gaps", "overdrawn", "inexact")]
-            ulp = f"{max(row['ulp']):.2g}" if "ulp" in row else ""
-            rows.append([f"`{facts['name']}`", f"`{row['entry']}`", share, *sums, ulp, refused])
-    head = ["family", "method", "wrong, at most", "gaps", "overdrawn", "inexact", "depth, ulp", "refuses from"]
-    return table_text(head, merge_walkers(rows))
+        axes = "; ".join(f"{what}: {values[0]} to {values[-1]}" for what, values in facts["axes"].items())
+        names = (facts["name"], "auto")
+        row = next((row for row in record["maps"] if (row["family"], row["entry"]) == names), None)
+        rows.append([f"`{facts['name']}`", facts["what"], axes, *(engine_cells(row, facts) if row else [NEVER] * 3)])
+    head = ["family", "what", "parameter, from mild to harsh", "wrong, at most", "depth, ulp", "refuses from"]
+    return left_table(head, rows)
 
 
-def merge_walkers(rows: list[list[str]]) -> list[list[str]]:
-    """Put methods of the engine with the same figures into one row."""
-    result: list[list[str]] = []
-    for row in rows:
-        same = next((other for other in result if other[0] == row[0] and other[2:] == row[2:]), None)
-        if same:
-            same[1] += f", {row[1]}"
-        else:
-            result.append(row)
-    return result
+def engine_cells(row: Row, facts: Row) -> list[str]:
+    """The largest share of wrong pixels and its step, the largest error of depth, the first step that is refused."""
+    steps, wrong = steps_of(facts), row["wrong"]
+    worst = max((i for i, n in enumerate(wrong) if n is not None), key=lambda i: wrong[i] / facts["n_px"][i])
+    share = percent(wrong[worst], facts["n_px"][worst]) + (f" at {steps[worst]}" if wrong[worst] else "")
+    refused = next((steps[i] for i, n in enumerate(wrong) if n is None), NEVER)
+    return [share, f"{max(row['ulp']):.2g}" if "ulp" in row else "", refused]
+
+
+def engine_text(record: Record) -> str:
+    """The faults of the production methods but whole pixels, over all families."""
+    rows = [row for row in record["maps"] if row["entry"] in PRODUCTION and row["entry"] != COARSE]
+    gaps, overdrawn, inexact = (sum(n for row in rows for n in row[key] if n) for key in Faults._fields[1:])
+    return (
+        f"{', '.join(f'`{name}`' for name in dict.fromkeys(row['entry'] for row in rows))} over all scenes: "
+        f"{gaps:,} gaps, {overdrawn:,} pixels drawn more than once, {inexact:,} inexact."
+    )
 
 
 def percent(count: int, n: int) -> str:
@@ -110,30 +107,5 @@ def percent(count: int, n: int) -> str:
     return "0" if not count else f"{share:.2g} %" if share < 10 else f"{share:.0f} %"
 
 
-def not_applicable_text(record: Record) -> str:
-    """Which rows are missing, and why."""
-    reasons: dict[str, list[str]] = {}
-    for name, why in record["not_applicable"].items():
-        reasons.setdefault(why, []).append(f"`{name}`")
-    return "\n".join(f"- {', '.join(names)}: {why}." for why, names in reasons.items())
-
-
-def scenes_text(_: Record) -> str:
-    """The scenes that are kept."""
-    rows = []
-    for scene in FAILURE_SCENES.values():
-        methods = ", ".join(f"`{got.method}`" + ("" if got.subpixel_bits == 8 else f" ({got.subpixel_bits} bits)")
-                            for got in scene.got)  # fmt: skip
-        rows.append([f"`{scene.name}`", str(len(scene.triangles)), str(scene.subpixel_bits), methods])
-    head = ["scene", "triangles", "bits", "who fails"]
-    return "\n".join("| " + " | ".join(row) + " |" for row in [head, ["---"] * len(head), *rows])
-
-
-PARTS: dict[str, Callable[[Record], str]] = {
-    "families": families_text,
-    "first": first_text,
-    "production": production_text,
-    "not-applicable": not_applicable_text,
-    "scenes": scenes_text,
-}
+PARTS: dict[str, Callable[[Record], str]] = {"families": families_text, "engine": engine_text, "first": first_text}
 """The parts of the page by their markers `<!-- table: NAME -->`."""

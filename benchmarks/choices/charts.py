@@ -26,14 +26,14 @@ def chart_choices(record: dict[str, Any]) -> Figure:
     """Return a row for each choice: time of the planner's way by that of the best, a dot a scene, a bar the mean."""
     rows = by_choice(record)
     kinds = list(dict.fromkeys(row["kind"] for row in record["rows"]))
-    figure, axis = plt.subplots(figsize=(9, 1.7 + 0.34 * len(rows)), layout="constrained")
+    figure, axis = plt.subplots(figsize=(4.6, 2.6 + 0.42 * len(rows)), layout="constrained")
     rng = np.random.default_rng(1)
     for i, own in enumerate(rows.values()):
         lift = rng.uniform(-0.28, 0.28, len(own))
         for k, kind in enumerate(kinds):
             at = [j for j, row in enumerate(own) if row["kind"] == kind]
             axis.plot([own[j]["ratio"] for j in at], i + lift[at], MARKERS[k % 10], color=COLORS[k % 10], ms=4,
-                      mec="white", mew=0.4, zorder=3, clip_on=False)  # fmt: skip
+                      mec="white", mew=0.4, zorder=3)  # fmt: skip
         axis.plot([mean(own)] * 2, [i - 0.4, i + 0.4], color="black", lw=2, zorder=4)
     worst = max(row["ratio"] for row in record["rows"])
     for line, style in ((NEAR, "--"), (FAR, "-")):
@@ -47,11 +47,10 @@ def chart_choices(record: dict[str, Any]) -> Figure:
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="x", color="0.9", lw=0.6)
     axis.set_axisbelow(True)
-    axis.set_xlabel("time of what is chosen, by that of the best way measured (black: mean over the scenes)")
+    axis.set_xlabel("time of what is chosen, by that of the best way\n(black: mean over the scenes)")
     handles = [
         plt.Line2D([], [], ls="", marker=MARKERS[k % 10], color=COLORS[k % 10], mec="white", mew=0.4, ms=6, label=kind)
         for k, kind in enumerate(kinds)
     ]
-    below = -0.55 / (0.34 * len(rows))  # inches under the axis
-    axis.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.42, below), ncols=6, fontsize=8)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=8)
     return figure

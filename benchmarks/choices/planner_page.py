@@ -1,13 +1,9 @@
-"""The plans of docs/measured/planner.md: what `tl.plan` says of two scenes."""
+"""The plan of docs/measured/planner.md: what `tl.plan` says of a mesh that is drawn again."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 import topleft as tl
 from benchmarks.harness.arguments import option
@@ -15,23 +11,15 @@ from benchmarks.harness.machine import PAGES
 from benchmarks.harness.records import Record, Save, write_text
 from benchmarks.report.pages import with_parts
 from benchmarks.report.study import Study
-from topleft.scenes import blob, shape
+from topleft.scenes import blob
 
 PAGE = PAGES / "planner.md"
-PERSPECTIVE = np.array([[0.6, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, -1, 1], [0, 0, -1, 3]])
+"""With the marker of the plan."""
 
 
-def scenes() -> Iterator[tuple[str, tuple[Any, ...], dict[str, Any]]]:
-    """Give a title, the arrays and size, and options."""
-    size = (1920, 1080)
-    yield "A knot in perspective", (*shape("torus-knot"), size), {"transform": PERSPECTIVE, "threads": 1}
-    camera = tl.Camera.framing(mesh := tl.Mesh(*blob(1_000_000)), aspect=16 / 9)
-    yield "A mesh of a million triangles, drawn again", (mesh, camera, size), {"threads": 1}
-
-
-def plans_text(record: Record) -> str:
-    """A section for each plan."""
-    return "\n" + "\n".join(f"## {title}\n\n```\n{plan}\n```\n" for title, plan in record["plans"])
+def plan_text(record: Record) -> str:
+    """The plan, as it is printed."""
+    return f"```\n{record['plan']}\n```"
 
 
 @dataclass(frozen=True)
@@ -42,14 +30,14 @@ class PlannerOptions:
 
 
 def run(options: PlannerOptions, _: Save) -> Record:
-    """Make the plans, draw them, and write them into the page."""
-    plans = [(title, tl.plan(*mesh, **asked).measure().explain()) for title, mesh, asked in scenes()]
-    record = {"kind": "planner", "plans": plans}
+    """Make a plan, draw it, and write it into the page."""
+    camera = tl.Camera.framing(mesh := tl.Mesh(*blob(1_000_000)), aspect=16 / 9)
+    record = {"kind": "planner", "plan": tl.plan(mesh, camera, (1920, 1080), threads=1).measure().explain()}
     write_text(options.out, with_parts(PAGE.read_text(encoding="utf-8"), record, STUDY.parts))
     return record
 
 
 STUDY = Study(
-    "planner", "write the plans of two scenes into their page", PlannerOptions, run,
-    lambda record: [plans_text(record)], {"plans": plans_text},
+    "planner", "write a plan into its page", PlannerOptions, run, lambda record: [plan_text(record)],
+    {"plan": plan_text},
 )  # fmt: skip

@@ -13,6 +13,9 @@ Row = dict[str, Any]
 NEAR, FAR = 1.15, 1.5
 """The limits of the mean over scenes, and of any scene."""
 
+N_MISSES = 12
+"""Scenes that the table of misses names, the worst first."""
+
 
 def lines(record: Record) -> Iterator[str]:
     """The report of one record, Markdown."""
@@ -76,7 +79,9 @@ def misses_text(record: Record) -> str:
     ]  # fmt: skip
     if not rows:
         return f"No way is {NEAR} times as fast as the chosen one in any scene."
-    return table_text(["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"], rows)
+    head = ["choice", "scene", "chosen", "best", "ms", "best ms", "ratio", "quartiles"]
+    more = f"\n\n{n_more} more, of {len(record['rows']):,} rows." if (n_more := len(rows) - N_MISSES) > 0 else ""
+    return table_text(head, rows[:N_MISSES]) + more
 
 
 PARTS: Mapping[str, Callable[[Record], str]] = {

@@ -26,27 +26,13 @@ def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
 def chart_levels(record: dict[str, Any]) -> Figure:
     """Return a panel for each mesh."""
     meshes = record["meshes"]
-    n_columns = min(2, len(meshes))
-    n_rows = -(-len(meshes) // n_columns)
-    figure, panels = plt.subplots(
-        n_rows,
-        n_columns,
-        figsize=(5.2 * n_columns, 3.5 * n_rows),
-        squeeze=False,
-        sharex=True,
-        sharey=True,
-        layout="constrained",
-    )
-    for panel, mesh in zip(panels.flat, meshes, strict=False):
+    n = len(meshes)
+    figure, panels = plt.subplots(n, 1, figsize=(4.6, 2.9 * n + 0.8), squeeze=False, sharex=True, layout="constrained")
+    for panel, mesh in zip(panels.flat, meshes, strict=True):
         draw_mesh(panel, mesh, record["tolerance"])
-    for panel in list(panels.flat)[len(meshes) :]:
-        panel.axis("off")
-    for panel in panels[:, 0]:
         panel.set_ylabel("rasterize, one thread, ms")
-    for panel in panels[-1]:
-        panel.set_xlabel("outlines are off by, px (measured)")
-    handles, labels = panels.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    panels[-1, 0].set_xlabel("outlines are off by, px (measured)")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 

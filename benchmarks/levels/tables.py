@@ -5,25 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from benchmarks.harness.records import Record
-from benchmarks.report.tables import table, table_text
+from benchmarks.report.tables import table_text
 
 
-def rows_of(mesh: Record, head: str = "mesh seen") -> tuple[list[str], list[list[str]]]:
-    """Return a table of one mesh: a row for each height, with the level that is drawn."""
-    header = [head, "level", "triangles", "bound, px", "measured, px", "full, ms", "in clusters, ms", "level, ms",
-              "faster"]  # fmt: skip
+def meshes_text(record: Record) -> str:
+    """A row for each mesh and height, with the level that is drawn."""
+    head = ["mesh", "height", "level", "triangles", "bound, px", "measured, px", "full, ms", "in clusters, ms",
+            "level, ms", "faster"]  # fmt: skip
     rows = []
-    for view in mesh["views"]:
-        own, full = view["levels"][view["level"]], view["levels"][0]
-        n = mesh["levels"][view["level"]]["n_triangles"]
-        times = [min(one["turns_ms"]) for one in (full, own)]
-        clustered = min(view["clustered_ms"])
-        rows.append([
-            f"{view['height_px']} px high", str(view["level"]), f"{n:,}", f"{own['bound_px']:.2f}",
-            f"{own['error_px']:.2f}", f"{times[0]:.2f}", f"{clustered:.2f}", f"{times[1]:.2f}",
-            f"{times[0] / times[1]:.1f} x, {clustered / times[1]:.1f} x",
-        ])  # fmt: skip
-    return header, rows
+    for mesh in record["meshes"]:
+        for view in mesh["views"]:
+            own, full = view["levels"][view["level"]], view["levels"][0]
+            n = mesh["levels"][view["level"]]["n_triangles"]
+            times = [min(one["turns_ms"]) for one in (full, own)]
+            clustered = min(view["clustered_ms"])
+            rows.append([
+                f"{mesh['name']}, {mesh['n_triangles']:,}", f"{view['height_px']} px high", str(view["level"]),
+                f"{n:,}", f"{own['bound_px']:.2f}", f"{own['error_px']:.2f}", f"{times[0]:.2f}", f"{clustered:.2f}",
+                f"{times[1]:.2f}", f"{times[0] / times[1]:.1f} x, {clustered / times[1]:.1f} x",
+            ])  # fmt: skip
+    return table_text(head, rows)
 
 
 def facts_text(record: Record) -> str:
@@ -35,25 +36,10 @@ def facts_text(record: Record) -> str:
     )
 
 
-def meshes_text(record: Record) -> str:
-    """A section for each mesh: its levels, and the one that is drawn at each height."""
-    parts = []
-    for mesh in record["meshes"]:
-        parts.append(f"\n## {mesh['name']}, {mesh['n_triangles']:,} triangles\n")
-        parts.append(f"Levels were made in {mesh['made_s']:.1f} s of CPU time.\n")
-        counts = [["triangles", *(f"{one['n_triangles']:,}" for one in mesh["levels"])]]
-        for name in ("bound", "known"):
-            counts.append([f"{name}, of the size", *(f"{one[name]:.1e}" for one in mesh["levels"])])
-        parts.append(table_text(["level", *map(str, range(len(mesh["levels"])))], counts) + "\n")
-        parts.append(table_text(*rows_of(mesh)))
-    return "\n".join(parts) + "\n"
-
-
 def lines(record: Record) -> Iterator[str]:
-    """Give the tables."""
-    for mesh in record["meshes"]:
-        yield ""
-        yield from table(*rows_of(mesh, f"{mesh['name']}, {mesh['n_triangles']:,}"))
+    """The report: the table, and the time that making the levels took."""
+    yield meshes_text(record)
+    yield from (f"{mesh['name']}: levels were made in {mesh['made_s']:.1f} s of CPU time." for mesh in record["meshes"])
 
 
 PARTS: Mapping[str, Callable[[Record], str]] = {"level-facts": facts_text, "levels": meshes_text}

@@ -51,7 +51,7 @@ def outlines_text(record: Record) -> str:
 
 def sheets_text(record: Record) -> str:
     """The sheets."""
-    return "\n" + "\n\n".join(map(sheet_text, record["scenes"])) + "\n"
+    return "\n".join(map(sheet_text, record["scenes"]))
 
 
 def sheet_text(row: Record) -> str:

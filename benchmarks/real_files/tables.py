@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
@@ -14,9 +13,6 @@ from benchmarks.report.tables import facts_text, left_table, number, table_text
 
 N_EXAMPLES = 2
 """Files that a row of a table of lines names."""
-
-N_LINES = 10
-"""Lines that the documentation shows, of the most files; a run prints all."""
 
 Row = dict[str, Any]
 
@@ -47,7 +43,7 @@ def summary(record: Record) -> str:
     )
 
 
-def lines_of(record: Record, outcome: str, n_most: int | None = None) -> str:
+def lines_of(record: Record, outcome: str) -> str:
     """A row for each kind of line that a command printed, of most files first, with the first of them."""
     kinds: dict[str, list[str]] = {}
     for row in record["files"]:
@@ -58,9 +54,7 @@ def lines_of(record: Record, outcome: str, n_most: int | None = None) -> str:
         [f"`{kind}`", str(len(files)), ", ".join(list(dict.fromkeys(files))[:N_EXAMPLES])]
         for kind, files in sorted(kinds.items(), key=lambda entry: (-len(entry[1]), entry[0]))
     ]
-    n_more = len(rows) - len(rows[:n_most])
-    more = f"\n\n{n_more} more lines, of {sum(int(row[1]) for row in rows[n_most:])} files." if n_more else ""
-    return left_table(["line", "files", "such as"], rows[:n_most]) + more if rows else "None."
+    return left_table(["line", "files", "such as"], rows) if rows else "None."
 
 
 def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
@@ -73,18 +67,6 @@ def kinds_of(line: str, file: str, outcome: str) -> Iterator[str]:
             yield re.sub(r"\b\d+\b", "N", re.sub(r"^cannot (read|draw) FILE: ", "", text))[:160]
 
 
-def suffixes(record: Record) -> str:
-    """A row a suffix."""
-    rows = []
-    for suffix, n in Counter(Path(row["file"]).suffix.lower() for row in record["files"]).most_common():
-        of_suffix = [row for row in record["files"] if Path(row["file"]).suffix.lower() == suffix]
-        drawn = [row for row in of_suffix if row["outcome"] == "drawn"]
-        rows.append(
-            [suffix, str(n), str(len(drawn)), str(sum(bool(row["line"]) for row in drawn)), str(n - len(drawn))]
-        )
-    return table_text(["suffix", "files", "drawn", "with a warning", "not drawn"], rows)
-
-
 def lines(record: Record) -> Iterator[str]:
     """The printed lines."""
     yield summary(record)
@@ -93,10 +75,4 @@ def lines(record: Record) -> Iterator[str]:
         yield lines_of(record, outcome)
 
 
-PARTS = {
-    "folders": summary,
-    "suffixes": suffixes,
-    "refused": lambda record: lines_of(record, "refused", N_LINES),
-    "warned": lambda record: lines_of(record, "drawn", N_LINES),
-    "facts": facts_text,
-}
+PARTS = {"folders": summary, "facts": facts_text}

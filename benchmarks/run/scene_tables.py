@@ -1,7 +1,8 @@
-"""Tables of a record of meshes, strewn triangles and fills, for docs/measured/performance.md, between markers."""
+"""Tables of a record of meshes, strewn triangles and fills, for docs/measured/performance.md and the README."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ Run = dict[str, Any]
 MESHES = ["blob-10k", "blob-100k", "blob-1m", "blob-10m"]
 STREWN = ["random-1000x400", "random-10000x100", "random-100000x10", "random-1000000x4", "frames-near-first",
           "frames-far-first"]  # fmt: skip
+ISA_NAMES = {"avx512": "AVX-512", "avx2": "AVX2", "scalar": "scalar code"}
 FILLS = ["large-4k", "fill-4k", "fill-1000x300", "fill-20000x40", "fill-200000x8", "labels-planar"]
 
 
@@ -74,6 +76,38 @@ def facts_text(record: Record) -> str | None:
     )
 
 
+def headline_text(record: Record) -> str | None:
+    """The sentences that begin the README and its page: the time of a mesh, and of the peer."""
+    scenes = scenes_of(record, MESHES)
+    own = next((scene for scene in scenes if scene["scene"] == "blob-100k"), None)
+    if own is None:
+        return None
+    isas = isas_of(record)
+    runs = {ISA_NAMES.get(isa, isa): own_run(own, isa) for isa in isas}
+    times = ", ".join(f"{number(run['median_ms'])} ms with {name}" for name, run in runs.items() if run)
+    text = f"A mesh of {rounded(own)} triangles takes {times}, for ids and depth at 1920x1080 on one core"
+    pairs = [(scene, ratio(peer, first)) for scene in scenes
+             if (peer := peer_run(scene)) and (first := own_run(scene, isas[0]))]  # fmt: skip
+    if peer := peer_run(own):
+        low, high = (of(pairs, key=lambda pair: pair[1]) for of in (min, max))
+        text += (
+            f". The fastest other renderer that Python can call, {peer['peer']}, takes {number(peer['median_ms'])} ms "
+            f"there: {low[1]:.1f} times as long with {rounded(low[0])} triangles, {high[1]:.1f} times with "
+            f"{rounded(high[0])}"
+        )
+    return textwrap.fill(f"{text} ({record['machine']['cpu'].split(',')[0]}, {record['date'][:10]}).", 120)
+
+
+def peer_run(scene: Scene) -> Run | None:
+    """The time of the peer on one thread."""
+    return next((run for run in scene["runs"] if run["peer"] != OURS and run["threads"] == 1), None)
+
+
+def rounded(scene: Scene) -> str:
+    """The number of triangles to one digit."""
+    return f"{float(format(scene['n_triangles'], '.1g')):,.0f}"
+
+
 def meshes_text(record: Record) -> str | None:
     """A row for each mesh: instruction sets, threads, wide arrays, no cull, the peer."""
     scenes, isas = scenes_of(record, MESHES), isas_of(record)
@@ -86,7 +120,7 @@ def meshes_text(record: Record) -> str | None:
             next(iter(scenes_of(record, [scene["scene"] + end])), None) for end in ("-f64", "-nocull")
         )  # fmt: skip
         beside = own_run(wide, isas[0], name=scene["scene"]) if wide else None
-        peer = next((run for run in scene["runs"] if run["peer"] != OURS and run["threads"] == 1), None)
+        peer = peer_run(scene)
         peak = first.get("peak_mb") if first else None
         rows.append([
             f"{scene['n_triangles']:,}",
@@ -115,9 +149,9 @@ def rows_text(names: list[str]) -> Callable[[Record], str | None]:
 
 
 PARTS: dict[str, Callable[[Record], str | None]] = {
+    "headline": headline_text,
     "scene-facts": facts_text,
     "meshes": meshes_text,
-    "strewn": rows_text(STREWN),
-    "fills": rows_text(FILLS),
+    "other-scenes": rows_text([*STREWN, *FILLS]),
 }
 """The parts of the page by their markers `<!-- table: NAME -->`."""

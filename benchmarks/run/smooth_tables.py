@@ -6,9 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.harness.records import Record
-from benchmarks.peers import OURS
 from benchmarks.report.tables import commit_text, number, table_text
-from benchmarks.run.tables import ratio
 
 Run = dict[str, Any]
 
@@ -35,66 +33,36 @@ def facts_text(record: Record) -> str:
     skipped = {f"{skip['name']}: {skip['reason']}" for scene in timed_scenes(record) for skip in scene["skipped"]}
     text = (
         f"{machine['cpu']}, {machine['system']}, Python {machine['python']}, at {commit_text(record)}, "
-        f"{record['date'][:10]}; one thread each, medians of {options['repeats']} rounds with their quartiles, ms. "
+        f"{record['date'][:10]}; one thread each, medians of {options['repeats']} rounds, ms. "
         f"{versions}."
     )
     return text + (f" Skipped: {'; '.join(sorted(skipped))}." if skipped else "")
 
 
 def times_text(record: Record) -> str:
-    """A row for each contestant, a column for each scene."""
+    """A row for each contestant: the time of each scene, the error of single triangles, the seams of a mesh."""
     scenes = timed_scenes(record)
+    exact = {scene["scene"]: scene for scene in record["scenes"] if scene["scene"] in (SINGLES, SEAMS)}
     names = list(dict.fromkeys(run["name"] for scene in scenes for run in scene["runs"]))
     rows = []
     for name in names:
         runs = [find_run(scene, name) for scene in scenes]
         gives = next(run["gives"] for run in runs if run)
-        rows.append([name, gives, *(time_text(run) for run in runs)])
-    return table_text(["contestant", "gives", *(column(scene) for scene in scenes)], rows)
+        single, seams = (error_of(exact.get(key), name) for key in (SINGLES, SEAMS))
+        errors = [f"{single['rms']:.2g}" if single else "-", f"{seams['wrong_px']:,}" if seams else "-"]
+        rows.append([name, gives, *(number(run["median_ms"]) if run else "-" for run in runs), *errors])
+    head = [*(column(scene) for scene in scenes), "RMS error", "seam pixels"]
+    return table_text(["contestant", "gives", *head], rows)
+
+
+def error_of(scene: dict[str, Any] | None, name: str) -> dict[str, Any]:
+    """The error of a contestant's picture; nothing if it did not take part."""
+    return ((find_run(scene, name) if scene else None) or {}).get("error") or {}
 
 
 def column(scene: dict[str, Any]) -> str:
     """The name of a scene in a table."""
     return scene["scene"].removeprefix("smooth-")
-
-
-def time_text(run: Run | None) -> str:
-    """Median and quartiles."""
-    return f"{number(run['median_ms'])} ({number(run['q1_ms'])} to {number(run['q3_ms'])})" if run else "-"
-
-
-def ratios_text(record: Record) -> str:
-    """How many times as long as each of our ways the fastest peer takes, and which that is."""
-    scenes = timed_scenes(record)
-    ours = list(dict.fromkeys(run["name"] for scene in scenes for run in scene["runs"] if run["peer"] == OURS))
-    rows = []
-    for name in ours:
-        cells = []
-        for scene in scenes:
-            own, peers = find_run(scene, name), [run for run in scene["runs"] if run["peer"] != OURS]
-            best = min(peers, key=lambda run: run["median_ms"], default=None)
-            cells.append(f"{ratio(best, own):#.3g} ({best['name']})" if own and best else "-")
-        rows.append(["fastest peer over", name, *cells])
-    return table_text(["", "", *(column(scene) for scene in scenes)], rows)
-
-
-def errors_text(record: Record) -> str:
-    """Error over partly covered pixels of single triangles, and seams of a mesh."""
-    scenes = {scene["scene"]: scene for scene in record["scenes"]}
-    names = list(dict.fromkeys(run["name"] for key in (SINGLES, SEAMS) for run in scenes[key]["runs"]))
-    rows = []
-    for name in names:
-        single, seams = (find_run(scenes[key], name) for key in (SINGLES, SEAMS))
-        error = (single or {}).get("error") or {}
-        seam = (seams or {}).get("error") or {}
-        rows.append([
-            name,
-            (single or seams or {})["gives"],
-            f"{error['rms']:.2g}" if error else "-",
-            f"{error['worst']:.2g}" if error else "-",
-            f"{seam['wrong_px']:,}" + (f" ({255 * seam['darkest']:.0f})" if seam["wrong_px"] else "") if seam else "-",
-        ])  # fmt: skip
-    return table_text(["contestant", "gives", "RMS error", "largest", "seam pixels (darkest)"], rows)
 
 
 def if_measured(text: Callable[[Record], str]) -> Callable[[Record], str | None]:
@@ -105,7 +73,5 @@ def if_measured(text: Callable[[Record], str]) -> Callable[[Record], str | None]
 PARTS: dict[str, Callable[[Record], str | None]] = {
     "smooth-facts": if_measured(facts_text),
     "smooth-times": if_measured(times_text),
-    "smooth-ratios": if_measured(ratios_text),
-    "smooth-errors": if_measured(errors_text),
 }
 """The parts of the page by their markers `<!-- table: NAME -->`."""

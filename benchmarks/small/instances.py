@@ -25,7 +25,7 @@ from benchmarks.harness.arguments import Options, count, option
 from benchmarks.harness.machine import describe
 from benchmarks.harness.records import Record, Save
 from benchmarks.report.study import Study
-from benchmarks.report.tables import facts_text, table
+from benchmarks.report.tables import facts_text, number, table
 
 SIZE = (1920, 1080)
 WIDE = 10
@@ -133,27 +133,20 @@ def own_gb() -> float | None:
 
 
 def lines(record: Record) -> Iterator[str]:
-    """The table: a row a scene, tolerance and number of threads."""
-    rows = []
+    """The table: a row a scene and tolerance, the median of each number of threads."""
+    groups: dict[tuple[Any, ...], Record] = {}
     for row in record["rows"]:
-        spread = statistics.quantiles(row["seconds"]) if len(row["seconds"]) > 1 else 3 * row["seconds"]
-        rows.append([row["scene"], f"{row['instances']:,}", f"{row['triangles']:,}", f"{row['tolerance']:g}",
-                     str(row["threads"]), str(row["shown"]), f"{min(row['seconds']):.3f}", f"{spread[1]:.3f}",
-                     f"{spread[0]:.3f} to {spread[2]:.3f}",
-                     f"{row['own_gb']:.1f}" if row.get("own_gb") else ""])  # fmt: skip
-    head = [
-        "scene",
-        "instances",
-        "triangles",
-        "tolerance, px",
-        "threads",
-        "show",
-        "least, s",
-        "median, s",
-        "quartiles",
-        "own GB",
-    ]
-    yield from table(head, rows)
+        own = groups.setdefault((row["scene"], row["instances"], row["tolerance"]), {**row, "of_threads": {}})
+        own["of_threads"][row["threads"]] = statistics.median(row["seconds"])
+    counts = sorted({row["threads"] for row in record["rows"]})
+    rows = [
+        [row["scene"], f"{row['instances']:,}", f"{row['triangles']:,}", f"{row['tolerance']:g}", str(row["shown"]),
+         *(number(row["of_threads"][n]) if n in row["of_threads"] else "-" for n in counts),
+         f"{row['own_gb']:.1f}" if row.get("own_gb") else ""]
+        for row in groups.values()
+    ]  # fmt: skip
+    threads = [f"{n} thread{'s' * (n > 1)}, s" for n in counts]
+    yield from table(["scene", "instances", "triangles", "tolerance, px", "show", *threads, "own GB"], rows)
 
 
 PARTS: dict[str, Callable[[Record], str | None]] = {

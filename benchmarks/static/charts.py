@@ -34,20 +34,25 @@ def draw_charts(record: dict[str, Any], folder: Path) -> list[Path]:
 
 def chart_static(record: dict[str, Any]) -> Figure:
     """Return a panel for each way to cull, a line for each view of the blob, and a dot for each of the other scenes."""
-    others = [row for row in record["rows"] if row["kind"] != "blob" or row["verb"] == "render"]
+    others = [row for row in record["rows"] if is_shown(row)]
     others.sort(key=lambda row: (list(KIND_COLORS).index(row["kind"]), row["model"], -faster(row)))
-    height = 3.6 + 0.17 * len(others)
-    figure = plt.figure(figsize=(9, height), layout="constrained")
-    grid = figure.add_gridspec(2, 2, height_ratios=[3.4, max(1.0, 0.17 * len(others))])
-    first = figure.add_subplot(grid[0, 0])
-    second = figure.add_subplot(grid[0, 1], sharey=first)
-    for axis, cull in ((first, "none"), (second, "back")):
-        draw_blobs(axis, record, cull)
-    first.set_ylabel("times as fast as whole")
-    second.tick_params(labelleft=False)
+    height = 0.9 + 0.17 * len(others)
+    figure = plt.figure(figsize=(4.6, 5.6 + height), layout="constrained")
+    upper, lower = figure.subfigures(2, 1, height_ratios=[5.6, height])
+    first, second = upper.subplots(2, 1)
+    draw_blobs(first, record, "none")
+    draw_blobs(second, record, "back")
     first.legend(fontsize=8, loc="upper left")
-    draw_others(figure.add_subplot(grid[1, :]), others)
+    draw_others(third := lower.subplots(), others)
+    lower.legend(*third.get_legend_handles_labels(), fontsize=8, ncols=3, loc="outside lower center")
     return figure
+
+
+def is_shown(row: dict[str, Any]) -> bool:
+    """Tell whether a row has a dot: other scenes than blobs by the plain call, and lit blobs."""
+    if row["kind"] == "blob":
+        return bool(row["verb"] == "render")
+    return bool((row["cull"], row["sampling"], row["verb"]) == ("none", "center", "rasterize"))
 
 
 def draw_blobs(axis: Axes, record: dict[str, Any], cull: str) -> None:
@@ -65,8 +70,8 @@ def draw_blobs(axis: Axes, record: dict[str, Any], cull: str) -> None:
             axis.plot(n, y, marker, color=color, mfc="white" if is_hollow else color, ms=5, zorder=3)
         axis.plot([], [], color=color, marker=marker, ms=5, lw=1.2, label=view)
     axis.axhline(1, color="0.4", lw=1, zorder=1)
-    axis.set(xscale="log", yscale="log", xlabel="triangles of the blob, 1920x1080")
-    axis.set_title("no culling" if cull == "none" else "back faces culled; hollow: kept whole", loc="left")
+    axis.set(xscale="log", yscale="log", xlabel="triangles of the blob, 1920x1080", ylabel="times as fast as whole")
+    axis.set_title("no culling" if cull == "none" else "back faces culled", loc="left")
     label_ticks(axis, "y")
     axis.grid(color="0.92", lw=0.6)
     axis.set_axisbelow(True)
@@ -85,13 +90,11 @@ def draw_others(axis: Axes, rows: list[dict[str, Any]]) -> None:
         axis.plot(middle, i, "o", color=color, mfc=inside, ms=5, label=label, zorder=3)
     axis.axvline(1, color="0.4", lw=1, zorder=1)
     axis.set(xscale="log", ylim=(len(rows) - 0.4, -0.6), xlabel="times as fast as whole")
-    axis.set_yticks(range(len(rows)), [label_of(row) for row in rows], fontsize=7.5)
+    axis.set_yticks(range(len(rows)), [label_of(row) for row in rows], fontsize=8)
     axis.tick_params(axis="y", length=0)
     axis.grid(axis="x", color="0.92", lw=0.6)
     axis.set_axisbelow(True)
     label_ticks(axis, "x")
-    if rows:
-        axis.legend(fontsize=8, loc="lower right")
 
 
 def label_ticks(axis: Axes, which: str) -> None:

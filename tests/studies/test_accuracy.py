@@ -20,7 +20,7 @@ from topleft.methods.reference.integers import ExactPicture
 SIZE = (12, 11)
 METHODS = ["auto", "row_crossing/cull-front", "float_barycentric"]
 CHARTS = [f"accuracy-{name}" for name in ("peers", "coverage", "antialiasing", "depth")]
-CHARTS += [f"speed-{name}" for name in ("sizes", "scaling", "tutorial")]
+CHARTS += [f"speed-{name}" for name in ("sizes", "tutorial")]
 
 
 @pytest.mark.parametrize("name", FAMILIES)

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from benchmarks.accuracy import pure, speed_tables
+from benchmarks.accuracy import pure
 from benchmarks.accuracy import study as accuracy
 from benchmarks.accuracy.depth import BITS, FORMATS, RATIOS, clip_scene, covered, make_sheets
 from benchmarks.accuracy.filling import areas, measure_family
@@ -115,12 +115,6 @@ def test_depth_more_bits_are_better_and_reversed_depth_is_best():
     share = {name: count(sheets, FRAME_PX, pixels) for name, count in FORMATS.items()}
     assert share["topleft, reversed"] == 0 < share["topleft"] <= share["float32 arithmetic"]
     assert share["24-bit integer"] < share["16-bit integer"]
-
-
-def test_finest_gap_ends_before_the_first_mistake():
-    rows = [{"bits": bits, "wrong_px": wrong, "n_px": 100_000} for bits, wrong in ((2, 0), (3, 100), (4, 101), (5, 0))]
-    assert speed_tables.finest_gap(rows) == "1/8"
-    assert speed_tables.finest_gap(rows[2:]) == "-"
 
 
 @pytest.mark.parametrize("area_px", [0.1, 1000.0])

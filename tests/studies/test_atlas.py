@@ -128,8 +128,9 @@ def test_atlas_exact_claims_hold(record):
 
 def test_atlas_page_shows_every_chart(record):
     text = (PAGES / "atlas.md").read_text(encoding="utf-8")
+    charts = [name for name, family in FAMILIES.items() if len(family.axes) == 1]
     shown = {path.stem for path in IMAGES.glob("atlas-*") if f"images/{path.name}" in text}
-    assert shown == {f"atlas-{name}" for name in (*FAMILIES, "depth", "scenes-any", "scenes-far", "scenes-shape")}
+    assert shown == {f"atlas-{name}" for name in (*charts, "depth", "scenes-any", "scenes-far", "scenes-shape")}
 
 
 def test_atlas_command_writes_what_report_prints(tmp_path, capsys):
@@ -141,7 +142,7 @@ def test_atlas_command_writes_what_report_prints(tmp_path, capsys):
     assert capsys.readouterr().out == printed
 
 
-def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
+def test_atlas_charts_have_a_row_a_method_and_a_colour_where_it_fails(record):
     from benchmarks.atlas import charts as atlas_charts
     from matplotlib import pyplot as plt
 
@@ -149,11 +150,9 @@ def test_atlas_charts_have_a_row_a_method_and_a_number_where_it_fails(record):
     figure = atlas_charts.chart_family(record, facts)
     rows = [label.get_text() for label in figure.axes[0].get_yticklabels()]
     assert rows == [row["entry"] for row in record["maps"] if row["family"] == "layers"]
-    right = figure.axes[1].texts  # a number in each cell that is not 0
-    assert len(right) == sum(bool(n) for row in record["maps"] if row["family"] == "layers" for n in row["overdrawn"])
-    assert [atlas_charts.share_text(x) for x in (0.5, 0.042, 0.0021, 0.0002, 0.00001)] == [
-        "50", "4.2", "0.2", ".02", "<.01"
-    ]  # fmt: skip
+    (colors,) = (image.get_array() for image in figure.axes[1].images)
+    n_failed = sum(bool(n) for row in record["maps"] if row["family"] == "layers" for n in row["overdrawn"])
+    assert (colors < 1).any(axis=2).sum() == n_failed > 10
     plt.close(figure)
 
 

@@ -31,6 +31,6 @@ def test_levels_commands_write_record_page_and_chart(tmp_path, monkeypatch, mesh
     assert "1000 px high" in capsys.readouterr().out
     page.write_text((PAGES / "levels.md").read_text())
     assert cli.main(["document", str(out), str(page)]) == 0
-    assert "\n\n## torus, 2,304 triangles\n" in page.read_text()
+    assert "\n| torus, 2,304 | 1000 px high |" in page.read_text()
     assert cli.main(["charts", str(out), "-o", str(tmp_path)]) == 0
     assert (tmp_path / "levels.png").read_bytes().startswith(b"\x89PNG")

@@ -98,8 +98,8 @@ def test_tables_count_lines_by_kind():
         {"folder": "a", "file": "c.glb", "outcome": "drawn", "line": "textures not found: 'd.png'"},
         {"folder": "a", "file": "e.glb", "outcome": "refused", "line": "cannot read 'e.glb': it has 3 of 4 bytes"},
     ]
-    warned = tables.PARTS["warned"]({"files": rows}).splitlines()
+    warned = tables.lines_of({"files": rows}, "drawn").splitlines()
     assert [line.split("|")[1:3] for line in warned[2:]] == [
         [" `textures not found`    ", " 2     "], [" `animations not played` ", " 1     "],
     ]  # fmt: skip
-    assert "| `it has N of N bytes` | 1 " in tables.PARTS["refused"]({"files": rows})
+    assert "| `it has N of N bytes` | 1 " in tables.lines_of({"files": rows}, "refused")

@@ -1,11 +1,13 @@
 """The benchmark suite: it runs, says what it left out, and tells a wrong picture from a right one. Nothing is timed."""
 
 import json
+import re
 
 import numpy as np
 import pytest
 from benchmarks import cli
 from benchmarks.harness.errors import compare, draw_exact
+from benchmarks.harness.machine import RECORDS
 from benchmarks.harness.rounds import RunOptions, run_cases
 from benchmarks.peers import PEERS, load_peer, why_not
 from benchmarks.report.tables import number
@@ -50,13 +52,24 @@ def test_run_wrong_pixels_none_of_ours_all_of_the_broken_one(record):
 
 def test_scene_tables_show_a_mesh_and_leave_out_what_was_not_measured():
     record = run_cases(RunOptions(["blob-10k", "large-4k"], [], [ISA], repeats=1, seconds=0))
-    mesh, fills = scene_tables.meshes_text(record), scene_tables.PARTS["fills"](record)
+    mesh, fills = scene_tables.meshes_text(record), scene_tables.PARTS["other-scenes"](record)
     median = record["scenes"][0]["runs"][0]["median_ms"]
     assert f"| 10,000    | {number(median)}" in mesh.replace("!", "")
     assert fills.splitlines()[2].startswith("| large-4k | 1 ")
     assert "not those of the exact picture: 0." in scene_tables.facts_text(record)
-    assert scene_tables.PARTS["strewn"](record) is None
+    assert scene_tables.headline_text(record) is None
     assert smooth_tables.PARTS["smooth-times"](record) is None
+
+
+def test_scene_tables_begin_with_the_first_set_that_was_measured():
+    record = json.loads((RECORDS / "scenes.json").read_text())
+    for scene in record["scenes"]:
+        scene["runs"] = [run for run in scene["runs"] if run.get("isa") != "avx512"]
+    first = scene_tables.headline_text(record).replace("\n", " ")
+    assert re.match(
+        r"A mesh of 100,000 triangles takes [\d.]+ ms with AVX2, [\d.]+ ms with scalar code, for ids", first
+    )
+    assert "two threads (avx2)" in scene_tables.meshes_text(record)
 
 
 def test_report_names_contestants_and_errors(record):

@@ -106,33 +106,18 @@ def test_rows_replace_those_of_the_same_scene(record):
 
 def test_tables_hold_what_was_measured(record):
     text = "\n".join(static_tables.lines(record))
-    assert "| 10,000,000 triangles seen whole " in text
-    assert text.count("| blob 70k, 200 in rows ") >= 1
-    groups = {(row["cull"], row["n_triangles"], row["size"][0]) for row in record["rows"] if row["kind"] == "blob"}
-    assert static_tables.blobs_text(record).count("\n") == 1 + sum(width != 512 for _, _, width in groups)
+    blobs = [row for row in record["rows"] if row["kind"] == "blob" and row["size"][0] != 512]
+    groups = {(row["cull"], row["n_triangles"]) for row in blobs}
+    assert static_tables.blobs_text(record).count("\n") == 1 + len(groups)
+    assert static_tables.blobs_text(record) in text
     assert static_tables.models_text(record).count("\n") == 1 + len(record["models"])
 
 
-@pytest.mark.parametrize(("ms", "kind", "text"), [(4.0, "blob", "6"), (4.0, "instances", "5"), (12.0, "blob", "never")])
-def test_sort_has_paid_when_it_has_saved_its_time(ms, kind, text):
-    row = {"is_clustered": True, "whole_ms": [0, 10.0, 0], "ms": [0, ms, 0], "model": "a", "kind": kind}
-    assert static_tables.paid_after({"models": [{"model": "a", "build_ms": 30.0}]}, row) == text
-
-
-def test_kind_of_scene_is_told_by_its_slowest_and_fastest():
-    row = {"model": "blob 10M", "view": "whole", "cull": "none", "sampling": "center", "verb": "rasterize"}
-    row |= {"size": [9, 9]}
-    rows = [row | {"faster": [0, faster, 0]} for faster in (1.4, 3.0)]
-    line = static_tables.kinds_text({"rows": rows}).splitlines()[2]
-    assert [cell.strip() for cell in line.strip("|").split("|")][1:] == ["1.40", "blob 10M, whole", "3"]
-
-
 def test_chart_has_a_row_for_each_other_scene(record, tmp_path):
-    from benchmarks.static.charts import chart_static, draw_charts
+    from benchmarks.static.charts import chart_static, draw_charts, is_shown
 
     first, second, others = chart_static(record).axes
-    n_others = sum(row["kind"] != "blob" or row["verb"] == "render" for row in record["rows"])
-    assert len(others.get_yticklabels()) == n_others
+    assert len(others.get_yticklabels()) == sum(map(is_shown, record["rows"])) > 5
     assert [text.get_text() for text in first.get_legend().get_texts()] == list(static_scenes.VIEWS)
     assert "culled" in second.get_title("left")
     assert [path.name for path in draw_charts(record, tmp_path)] == ["static.svg"]
@@ -145,4 +130,4 @@ def test_command_measures_and_adds_to_its_file(tmp_path, capsys):
     found = json.loads(out.read_text())
     assert {row["model"] for row in found["rows"]} == {"hills 1M", "soup, large, 30k"}
     assert {model["model"] for model in found["models"]} == {"hills 1M", "soup, large, 30k"}
-    assert "| any scene" in capsys.readouterr().out
+    assert "| hills 1M " in capsys.readouterr().out
