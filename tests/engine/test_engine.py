@@ -249,6 +249,14 @@ def test_engine_rows_of_four_million_samples_end_exactly(isa):
         assert col - 5 < ends[0] < col + 5
 
 
+@one_by_one("bits", [8, 9, 16])
+@ON_EACH_ISA
+def test_engine_counts_each_pixel_of_a_large_tiled_picture_once(bits, isa):
+    size = 1280, 720  # sorted into bands of rows where vertices have records: up to 8 bits
+    with on(isa):
+        assert (tl.overdraw(*scenes.planar_mesh(300, *size), size, subpixel_bits=bits, threads=1) == 1).all()
+
+
 def cross(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 

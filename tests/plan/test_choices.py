@@ -339,6 +339,17 @@ def test_no_table_of_costs_changes_a_bit(seed):
         assert chosen.tobytes() == other.tobytes()
 
 
+@pytest.mark.parametrize("bits", [0, 8, 9, 16])
+def test_counts_in_bands_and_as_they_come_are_equal(bits):
+    rng = np.random.default_rng(bits)
+    for _ in range(20):
+        scene = random_triangles(rng)
+        chosen, banded = both_ways(
+            lambda scene=scene: tl.overdraw(*scene, SIZE, subpixel_bits=bits), pays_to_sort=True, plane_bytes=600
+        )
+        assert (chosen == banded).all()
+
+
 def test_forced_choices_are_put_back():
     def fail():
         with choices.forced(is_flat=7, route=len, near_pixels=3):

@@ -350,7 +350,7 @@ def drawing(view: View, work: Work, sink: Sink) -> Drawing:
     """Return how a mesh is drawn."""
     n_threads = threads_to_draw(view, work, sink)
     sliced = is_sliced(view, work.n_triangles, n_threads, sink)
-    in_bands = pays_to_sort(view, work, sink)
+    in_bands = work.mesh.exact is None and pays_to_sort(view, work, sink)  # the sort reads snapped vertices
     return Drawing(sink, n_threads, sliced and not in_bands, pays_to_bound(view, work, sink), in_bands)
 
 
