@@ -15,7 +15,7 @@ BITS = one_by_one("bits", [0, 1, 4, 7, 8, 9, 12, 15, 16])
 
 # ---- the timed scenes -----------------------------------------------------------------------------------------------
 
-WIDE = (960, 540)
+WIDE = (480, 270)
 
 
 def blob(n, dtype, cull):
@@ -39,13 +39,13 @@ def one_large():
 @ON_EACH_ISA
 @pytest.mark.parametrize("cull", ["back", "none"])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("n", [5_000, 50_000])
+@pytest.mark.parametrize("n", [2_000, 20_000])
 def test_engine_blob_equals_exact_picture(n, dtype, cull, isa):
     check_all(isa, cases(blob, n, dtype, cull), THREADS)
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize(("n", "size_px"), [(500, 300), (5000, 70), (30_000, 10), (30_000, 4)])
+@pytest.mark.parametrize(("n", "size_px"), [(100, 300), (1000, 70), (8_000, 10), (8_000, 4)])
 def test_engine_strewn_triangles_equal_exact_picture(n, size_px, isa):
     check_all(isa, cases(strewn, n, size_px), THREADS)
 
@@ -64,14 +64,14 @@ MIXED = {
 }  # fmt: skip
 
 
-def twenty_thousand(seed):
-    yield mixed(np.random.default_rng(seed), 20_000, (480, 270), **MIXED[seed]), DEPTH_TESTS
+def six_thousand(seed):
+    yield mixed(np.random.default_rng(seed), 6_000, (260, 150), **MIXED[seed]), DEPTH_TESTS
 
 
 @one_by_one("seed", MIXED)
 @ON_EACH_ISA
 def test_engine_mixed_triangles_equal_exact_picture(seed, isa):
-    check_all(isa, cases(twenty_thousand, seed), (1, 3))
+    check_all(isa, cases(six_thousand, seed), (1, 3))
 
 
 def piles(n=5_000):
@@ -94,14 +94,14 @@ def test_engine_piles_of_mixed_triangles_equal_exact_picture(isa):
 LARGEST_BOX = 70
 
 
-def boxes(column):
-    """A triangle in each box of 0x0 to 70x70 samples, all boxes apart, in columns that are `column` modulo 4."""
-    rng = np.random.default_rng(column)
+def boxes():
+    """A triangle in each box of 0x0 to 70x70 samples, all boxes apart; each width begins in each column modulo 16."""
+    rng = np.random.default_rng(0)
     side = np.arange(LARGEST_BOX + 1)
     cols, rows = (a.ravel() for a in np.meshgrid(side, side))
-    x = column + 16 * np.concatenate([[0], np.cumsum(side // 16 + 2)[:-1]])
+    x = 16 * np.concatenate([[0], np.cumsum(side // 16 + 2)[:-1]])
     y = np.concatenate([[0], np.cumsum(side + 1)[:-1]])
-    first = np.stack([x[cols] + 4 * ((cols + rows) % 4), y[rows]], -1) * 256 + 128
+    first = np.stack([x[cols] + (5 * cols + 7 * rows) % 16, y[rows]], -1) * 256 + 128
     n = np.stack([cols, rows], -1) * 256
     low = first - rng.choice([0, 1, 128, 255], n.shape)
     high = first + n - 256 + rng.choice([1, 128, 255, 256], n.shape)
@@ -111,13 +111,12 @@ def boxes(column):
     order = np.argsort(rng.uniform(size=corners.shape), axis=1)
     xy = np.take_along_axis(corners, order, 1)
     xyz = np.dstack([xy / 256, rng.standard_normal(order.shape[:2])])
-    yield soup(xyz.reshape(-1, 3), (int(x[-1]) + LARGEST_BOX + 2, int(y[-1]) + LARGEST_BOX + 2)), ("less",)
+    yield soup(xyz.reshape(-1, 3), (int(x[-1]) + LARGEST_BOX + 17, int(y[-1]) + LARGEST_BOX + 2)), ("less",)
 
 
 @ON_EACH_ISA
-@pytest.mark.parametrize("column", range(4))
-def test_engine_boxes_of_each_size_equal_exact_picture(column, isa):
-    check_all(isa, cases(boxes, column), THREADS[column:][:1])
+def test_engine_boxes_of_each_size_equal_exact_picture(isa):
+    check_all(isa, cases(boxes), (1, 3))
 
 
 def quarters(n=8_000):
@@ -136,7 +135,7 @@ def test_engine_fullest_small_boxes_equal_exact_picture(isa):
 
 def frames():
     for width in range(1, 131):
-        for size in {(width, 1 + 7 * width % 23), (1 + 5 * width % 37, width)}:
+        for size in {(width, 1 + 7 * width % 23), *[(1 + 5 * width % 37, width)] * (width % 4 == 1)}:
             rng = np.random.default_rng(width)
             yield mixed(rng, 50, size, level=bool(width % 2)), DEPTH_TESTS
 
@@ -204,7 +203,7 @@ def windows_at(edge_px, bits):
     rng = np.random.default_rng(bits)
     size = (37, 21)
     for offset in [(-37, -21), (-36, 0), (-18, -10), (-1, -20), (0, 0), (1, 1)]:
-        for x_sign, y_sign in [(1, 0), (0, -1), (1, 1), (-1, -1), (-1, 1)]:
+        for x_sign, y_sign in [(1, 0), (0, -1), (-1, 1)]:
             near = (x_sign * edge_px + offset[0], y_sign * edge_px + offset[1])
             extents = np.concatenate([extents_at_limits(rng, bits, 20), rng.integers(0, 3 << bits, (20, 2))])
             scene = with_extents(rng, extents, size, bits, near)

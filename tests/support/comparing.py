@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from fractions import Fraction
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +51,8 @@ def half_ulp(value):
     if magnitude == 0:
         return Fraction(1, 2**150)
     exponent = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
-    exponent -= magnitude < Fraction(2) ** exponent
-    return Fraction(2) ** (max(exponent, -126) - 24)
+    exponent -= magnitude < ref.power_of_two(exponent)
+    return ref.power_of_two(max(exponent, -126) - 24)
 
 
 def assert_within(got, exact, slack):
@@ -93,7 +94,7 @@ class Candidate(NamedTuple):
 
     @classmethod
     def of(cls, fragment):
-        depth, slack = fragment.depth(), depth_slack(fragment)
+        depth, slack = fragment.depth(), depth_slack(fragment.piece)
         return cls(depth, slack, slack + 2 * half_ulp(depth))
 
 
@@ -122,9 +123,10 @@ def check_fragments(scene: Scene):
             assert_same(other.depth, frags.depth)
 
 
-def depth_slack(fragment):
+@lru_cache(maxsize=1)
+def depth_slack(piece):
     """25 * 2**-53 * box / area of the largest difference of depths; slivers by their weights (docs/design/rules.md)."""
-    a, b, c = fragment.piece.vertices
+    a, b, c = piece.vertices
     area = abs(ref.edge_function(a.xy_fx, b.xy_fx, c.xy_fx))
     box = 1
     for axis in range(2):

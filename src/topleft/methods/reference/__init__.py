@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
+from functools import cache
 from math import inf
 from typing import Any, NamedTuple
 
@@ -75,7 +76,8 @@ class Fragment(NamedTuple):
 
     def _weights_in_triangle(self, shares: list[Fraction]) -> list[Fraction]:
         mixed = [_dot(shares, [v.weights[k] for v in self.piece.vertices]) for k in range(3)]
-        return [m / sum(shares) for m in mixed]
+        total = sum(shares)
+        return [m / total for m in mixed]
 
 
 # ---- vertices -------------------------------------------------------------------------------------------------------
@@ -97,6 +99,12 @@ def snap(vertices: Any, subpixel_bits: int | str = 8) -> list[tuple[Coordinate, 
     return [(round(Fraction(p[0]) * scale), round(Fraction(p[1]) * scale)) for p in np.asarray(vertices).tolist()]
 
 
+@cache
+def power_of_two(exponent: int) -> Fraction:
+    """Return 2**exponent."""
+    return Fraction(2) ** exponent
+
+
 def round_to_float32(value: Fraction) -> float:
     """Return the float32 nearest to an exact value, ties to even (infinity beyond the largest finite float32).
 
@@ -107,9 +115,9 @@ def round_to_float32(value: Fraction) -> float:
     """
     magnitude = abs(value)
     exponent = magnitude.numerator.bit_length() - magnitude.denominator.bit_length()
-    if magnitude < Fraction(2) ** exponent:
+    if magnitude < power_of_two(exponent):
         exponent -= 1  # now 2**exponent <= magnitude < 2**(exponent + 1)
-    ulp = Fraction(2) ** (max(exponent, -126) - 23)
+    ulp = power_of_two(max(exponent, -126) - 23)
     nearest = round(value / ulp) * ulp
     if abs(nearest) > FLOAT32_MAX:
         return inf if value > 0 else -inf
@@ -316,24 +324,29 @@ def fragments(
             edges = [(b, c), (c, a), (a, b)]  # opposite the first, second and third vertex
         else:
             edges = [(c, b), (a, c), (b, a)]
-        first, second, third = edges
+        dy0, dy1, dy2 = (q[1] - p[1] for p, q in edges)
         least = [0 if is_top_left(*edge) else 1 for edge in edges]  # of integers: 1 is more than 0
-        for row, column in touched_pixels(piece, size, origin, 0 if is_exact else bits):
-            at = ((16 * (column + x_origin) + 8 + sample[0]) * unit, (16 * (row + y_origin) + 8 + sample[1]) * unit)
-            if (
-                (e0 := edge_function(*first, at)) >= least[0]
-                and (e1 := edge_function(*second, at)) >= least[1]
-                and (e2 := edge_function(*third, at)) >= least[2]
-            ):
-                yield Fragment(row, column, piece, (e0, e1, e2))
+        rows, columns = touched_pixels(piece, size, origin, 0 if is_exact else bits)
+        for row in rows:
+            y = (16 * (row + y_origin) + 8 + sample[1]) * unit
+            at_0, at_1, at_2 = (edge_function(*edge, (0, y)) for edge in edges)  # at x = 0: each falls by dy a unit
+            for column in columns:
+                x = (16 * (column + x_origin) + 8 + sample[0]) * unit
+                if (
+                    (e0 := at_0 - dy0 * x) >= least[0]
+                    and (e1 := at_1 - dy1 * x) >= least[1]
+                    and (e2 := at_2 - dy2 * x) >= least[2]
+                ):
+                    yield Fragment(row, column, piece, (e0, e1, e2))
 
 
-def touched_pixels(piece: Piece, size: Point, origin: Point, bits: int) -> Iterator[Point]:
-    """Yield ``(row, column)`` of the pixels of the window that the bounding box of a piece touches."""
+def touched_pixels(piece: Piece, size: Point, origin: Point, bits: int) -> tuple[range, range]:
+    """Return the rows and the columns of the window that the bounding box of a piece touches."""
     x_px, y_px = ([v.xy_fx[k] // 2**bits for v in piece.vertices] for k in range(2))
-    for row in range(max(0, min(y_px) - origin[1]), min(size[1], max(y_px) + 1 - origin[1])):
-        for column in range(max(0, min(x_px) - origin[0]), min(size[0], max(x_px) + 1 - origin[0])):
-            yield row, column
+    return (
+        range(max(0, min(y_px) - origin[1]), min(size[1], max(y_px) + 1 - origin[1])),
+        range(max(0, min(x_px) - origin[0]), min(size[0], max(x_px) + 1 - origin[0])),
+    )
 
 
 # ---- pictures -------------------------------------------------------------------------------------------------------
@@ -411,7 +424,8 @@ def interpolate(vertices: Any, triangles: Any, values: Any, size: Point, **optio
     winners = visible(vertices, triangles, size, **options)
     seen = _picture(size, [Fraction(0)] * values.shape[-1], {})
     for pixel, fragment in winners.items():
-        seen[pixel] = [_dot(fragment.weights(), v) for v in zip(*corners[fragment.piece.triangle], strict=True)]
+        weights = fragment.weights()
+        seen[pixel] = [_dot(weights, v) for v in zip(*corners[fragment.piece.triangle], strict=True)]
     return seen
 
 
@@ -429,14 +443,15 @@ def fill(
     for pixel, fragment in visible(vertices, triangles, size, depth_test=None, **view).items():
         index = fragment.piece.triangle
         corners = colors[[index] * 3 if per == "triangle" else triangles[index]].tolist()
-        mixed = [_dot(fragment.screen_weights(), channel) for channel in zip(*corners, strict=True)]
+        weights = fragment.screen_weights()
+        mixed = [_dot(weights, channel) for channel in zip(*corners, strict=True)]
         values[pixel] = mixed if is_float else [round(m) for m in mixed]
     picture = _picture(size, [background] * colors.shape[1], values)
     return picture if is_float else picture.astype(np.uint8)
 
 
 def _dot(weights: Iterable[Fraction | int], values: Iterable[float]) -> Fraction:
-    return sum((w * Fraction(v) for w, v in zip(weights, values, strict=True)), Fraction(0))
+    return sum((w * Fraction(v) for w, v in zip(weights, values, strict=True) if v), Fraction(0))
 
 
 def _picture(size: Point, background: Any, values: dict[Point, Any]) -> np.ndarray:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -103,10 +104,11 @@ def _conservative(
     for piece in reference.pieces(vertices, triangles, size, **view):
         unit = piece.denominator() if is_exact else 1 << bits
         corners = [(int(x * unit), int(y * unit)) if is_exact else (x, y) for x, y in _turned(piece)]
-        for row, column in reference.touched_pixels(piece, size, origin, 0 if is_exact else bits):
-            x, y = (column + origin[0]) * unit, (row + origin[1]) * unit
-            far_x, far_y = x + unit, y + unit
-            picture[row, column] |= test(corners, [(x, y), (far_x, y), (far_x, far_y), (x, far_y)])
+        for row, column in product(*reference.touched_pixels(piece, size, origin, 0 if is_exact else bits)):
+            if not picture[row, column]:
+                x, y = (column + origin[0]) * unit, (row + origin[1]) * unit
+                far_x, far_y = x + unit, y + unit
+                picture[row, column] = test(corners, [(x, y), (far_x, y), (far_x, far_y), (x, far_y)])
     return picture
 
 
