@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from functools import partial
@@ -58,38 +59,32 @@ def triptychs(scene: FailureScene) -> Iterator[Triptych]:
 
 
 def draw_sheet(found: list[Triptych]) -> Figure:
-    """Return two scenes a row, three pictures each."""
-    n_rows = (len(found) + 1) // 2
-    figure = plt.figure(figsize=(10, 2.05 * n_rows), layout="constrained")
-    for part, own in zip(figure.subfigures(n_rows, 2, wspace=0.04, squeeze=False).flat, found, strict=False):
-        draw_triptych(part, own)
+    """Return a scene a row, three pictures each."""
+    titles = [title_of(own) for own in found]
+    heights = [1.8 + 0.13 * title.count("\n") for title in titles]
+    figure = plt.figure(figsize=(4.6, sum(heights)), layout="constrained")
+    parts = figure.subfigures(len(found), 1, squeeze=False, height_ratios=heights).flat
+    for part, own, title in zip(parts, found, titles, strict=True):
+        draw_triptych(part, own, title)
     return figure
 
 
-def draw_triptych(part: Any, own: Triptych) -> None:
+def title_of(own: Triptych) -> str:
+    """The scene, and the methods that draw this picture of it."""
+    return textwrap.fill(f"{own.scene.name}: {', '.join(own.methods)}", 66)
+
+
+def draw_triptych(part: Any, own: Triptych, title: str) -> None:
     """Draw expected, got, difference."""
     scene = own.scene
     expected, got = picture(scene.expected), picture(own.rows)
     axes = part.subplots(1, 3)
-    part.suptitle(f"{scene.name}: {methods_text(own.methods)}", fontsize=7, x=0.02, ha="left")
-    for axis, title, values in zip(axes, ("expected", "got", "difference"), (expected, got, None), strict=True):
-        frame(axis, scene, title)
+    part.suptitle(title, fontsize=8, x=0.02, ha="left")
+    for axis, what, values in zip(axes, ("expected", "got", "difference"), (expected, got, None), strict=True):
+        frame(axis, scene, what)
         if values is not None:
             draw_values(axis, values, scene.kind)
     draw_difference(axes[2], expected, got, scene.kind)
-
-
-def methods_text(methods: list[str]) -> str:
-    """Names on at most two lines."""
-    shown = methods if len(methods) < 5 else [*methods[:4], f"{len(methods) - 4} more"]
-    text = ", ".join(shown)
-    if len(text) > 62:
-        text = (
-            ", ".join(shown[: len(shown) // 2 + len(shown) % 2])
-            + ",\n"
-            + ", ".join(shown[len(shown) // 2 + len(shown) % 2 :])
-        )
-    return text
 
 
 def frame(axis: Axes, scene: FailureScene, title: str) -> None:
@@ -97,7 +92,7 @@ def frame(axis: Axes, scene: FailureScene, title: str) -> None:
     width, height = scene.size
     axis.set(xlim=(-MARGIN_PX, width + MARGIN_PX), ylim=(height + MARGIN_PX, -MARGIN_PX), aspect="equal")
     axis.set_axis_off()
-    axis.set_title(title, fontsize=6.5, pad=2)
+    axis.set_title(title, fontsize=8, pad=2)
     for i in range(width + 1):
         axis.plot([i, i], [0, height], color="0.85", lw=0.5, zorder=1)
     for i in range(height + 1):
@@ -116,7 +111,7 @@ def draw_values(axis: Axes, values: NDArray[np.int32], kind: str) -> None:
         color = LABEL_COLORS[value % len(LABEL_COLORS)] if kind == "wrong" else COUNT_COLORS[min(int(value), 4)]
         axis.fill([j, j + 1, j + 1, j], [i, i, i + 1, i + 1], color=color, lw=0, zorder=0)
         if kind != "wrong" and value > 1:
-            axis.text(j + 0.5, i + 0.5, str(value), color="white", fontsize=5, ha="center", va="center", zorder=5)
+            axis.text(j + 0.5, i + 0.5, str(value), color="white", fontsize=8, ha="center", va="center", zorder=5)
 
 
 def draw_difference(axis: Axes, expected: NDArray[np.int32], got: NDArray[np.int32], kind: str) -> None:
