@@ -138,8 +138,8 @@ def test_mask_is_saved_black_and_white_and_ids_are_refused(tmp_path):
         tl.save_image(tmp_path / name, frags.mask)
     with Image.open(tmp_path / "mask.png") as image:
         assert np.array_equal(np.asarray(image), frags.mask * np.uint8(255))
-    for array in (frags.triangle, frags.depth):
-        with raises(tl.ImageError, ".tif and .npy hold ids and floats"):
+    for array, cure in ((frags.triangle, "(ids + 1).astype('uint16')"), (frags.depth, "(255 * share).astype('uint8')")):
+        with raises(tl.ImageError, f".tif and .npy hold ids and floats, .png holds {cure}"):
             tl.save_image(tmp_path / "a.png", array)
         tl.save_image(tmp_path / "a.tif", array)
         tl.save_image(tmp_path / "a.npy", array)

@@ -145,7 +145,7 @@ def test_texture_that_is_a_pointer_of_git_lfs_is_told(write, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.obj", "", "'.*a.obj' has no triangles"),
+        ("a.obj", "", "^'.*a.obj' is empty$"),
         *((f"a.{kind}", LFS, f"a.{kind}' is a Git LFS pointer.*git lfs pull") for kind in ("obj", "glb", "ply", "stl")),
         ("a.obj", "what is this\n", "has no triangles"),
         ("a.obj", SQUARE + "f 1 2 9\n", "cannot read '.*a.obj': broken, or not a '.obj' file"),
@@ -154,7 +154,7 @@ def test_texture_that_is_a_pointer_of_git_lfs_is_told(write, tmp_path):
         ("a.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "its vertex 1 has 2 of 3 numbers"),
         ("a.obj", "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", r"vertices\[1\] = \[1.0, 0.0, nan\] must be finite"),
         ("a.obj", b"\0\1\2\377", "broken, or not a '.obj' file .it is not text"),
-        ("a.stl", b"", "has no triangles|broken"),
+        ("a.stl", b"", "^'.*a.stl' is empty$"),
         ("a.stl", b"\200\0\3\377" * 50, "cannot read '.*a.stl': broken, or not a '.stl' file .it has 2 of"),
         ("a.ply", b"ply\nformat", "cannot read '.*a.ply': broken"),
         ("a.glb", b"glTF\2\0\0\0", "cannot read '.*a.glb': broken"),
@@ -184,6 +184,11 @@ def test_load_missing_file_is_refused(tmp_path):
 def test_load_folder_is_refused(tmp_path):
     with pytest.raises(MeshError, match="is a folder, not a mesh"):
         files.load(tmp_path)
+
+
+def test_load_address_is_refused():
+    with pytest.raises(TypeError, match=r"path must be a file of this machine, got the URL 'https://.*obj'"):
+        files.load("https://example.com/a.obj")
 
 
 def test_load_without_trimesh_says_how_to_get_it(write, monkeypatch):

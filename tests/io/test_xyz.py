@@ -34,7 +34,7 @@ def test_xyz_columns_are_what_their_numbers_can_be(tmp_path, rows, colors, norma
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("", "have no numbers"), ("1 2 3\n4 5\n", "have 2, 3 numbers"), ("1 2", "2")]
+    ("text", "message"), [("\n", "have no numbers"), ("1 2 3\n4 5\n", "have 2, 3 numbers"), ("1 2", "2")]
 )
 def test_xyz_that_is_broken_is_told(tmp_path, text, message):
     (tmp_path / "a.xyz").write_text(text)

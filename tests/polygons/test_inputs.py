@@ -207,7 +207,7 @@ def test_square_with_90_000_holes_keeps_three_quarters_of_each_pixel():
         ([(0, 0), (np.inf, 1), (2, 2)], ValueError, "rings must be finite, got [inf, 1.0] in point 1"),
         ([(0, 0), (1, 1e17), (2, 2)], ValueError, "rings must lie within 2**52 pixels of the window with 8 sub-pixel"),
         ([(0, 0), (1, 2**62), (2, 2)], ValueError, "rings must lie within 2**52 pixels of the window with 8 sub-pixel"),
-        ([(0, 0, 1), (1, 2, 2), (2, 2, 3)], ValueError, "got"),
+        ([(0, 0, 1), (1, 2, 2), (2, 2, 3)], ValueError, "got shape (3,); a point has x and y alone"),
         (np.zeros((3, 3)), ValueError, "rings must have shape (N, 2), got (3, 3)"),
         ([[0, 0, 1, 1, 2]], ValueError, "flat rings must hold x, y, x, y, an even number of numbers, got shape (5,)"),
         ((COORDINATES, [0, 4, 8]), ValueError, "ring_offsets must rise from 0 to the number of coordinates, 12; got"),

@@ -345,7 +345,10 @@ def _nested(values: Any) -> list[list[Any]]:
 def _unflat(ring: Any) -> npt.NDArray[Any]:
     numbers = np.asarray(ring)
     if numbers.ndim != 1 or len(numbers) % 2:
-        raise ValueError(f"flat rings must hold x, y, x, y, an even number of numbers, got shape {numbers.shape}")
+        raise ValueError(
+            "flat rings must hold x, y, x, y, an even number of numbers, "
+            f"got shape {numbers.shape}; a point has x and y alone"
+        )
     return numbers.reshape(-1, 2)
 
 

@@ -219,6 +219,9 @@ def _check_holds(path: Location, image: npt.NDArray[Any]) -> None:
     found = {f"{image.dtype} (H, W{channels})", f"{image.dtype} (H, W{', K' * (image.ndim - 2)})"}
     if image.ndim < 2 or not found & set(kinds):
         others = ".npy holds it as it is" if kinds is NUMBERS else ".tif and .npy hold ids and floats"
+        if path.suffix.lower() == ".png":
+            cure = "(255 * share).astype('uint8')" if image.dtype.kind == "f" else "(ids + 1).astype('uint16')"
+            others += f", .png holds {cure}"
         raise ImageError(
             f"cannot write {str(path)!r}: {path.suffix} holds {', '.join(kinds)}; got {image.dtype} {image.shape}"
             + f"; {others}" * (image.dtype.kind in "if")

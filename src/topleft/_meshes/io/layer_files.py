@@ -146,7 +146,9 @@ def _check_steps(path: Location, name: str, step: float, steps: npt.NDArray[Any]
     if not (low >= 0 and high <= LARGEST):
         raise ImageError(
             f"cannot write {str(path)!r}: {name} must lie in 0 to {LARGEST} steps of {step:g} for a PNG, "
-            f"got {low:g} to {high:g}; take .tiff, or another depth_scale"
+            f"got {low:g} to {high:g}; take .tiff"
+            + ", or depth_scale=1 where units are millimetres"
+            * (name in LENGTHS)
         )
 
 

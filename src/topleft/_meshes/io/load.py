@@ -312,6 +312,8 @@ def reading(source: InputFile, read: Callable[[], Made]) -> Made:
         raise MeshError(f"{str(path)!r} is a folder, not a mesh")
     if not path.is_file():
         raise MeshError(f"{str(path)!r} is a pipe or a device, not a file")
+    if not path.stat().st_size:
+        raise MeshError(f"{str(path)!r} is empty")
     if source.moment is not None and path.suffix.lower() not in GLTF_SUFFIXES:
         time = source.moment.time
         raise MeshError(f"{str(path)!r} has no time={time:g}: animations are read of glTF and GLB alone")
