@@ -64,7 +64,7 @@ def test_sample_coverage_0_bits_keeps_positions_between_the_grid():
     ]
 
 
-@pytest.mark.parametrize("bits", range(17))
+@pytest.mark.parametrize("bits", [0, 1, 7, 8, 16])
 def test_sample_coverage_is_that_of_centres_when_the_vertices_move_instead(bits):
     for vertices, triangles, size, view in scenes(bits, seed=bits):
         fixed = np.array(ref.snap(vertices, bits)) / 2.0**bits

@@ -46,7 +46,7 @@ def both_ways(draw, **forced):
 def test_flat_depth_left_out_gives_the_same_bits(depth_test):
     rng = np.random.default_rng(1)
     n_flat = 0
-    for _ in range(700):
+    for _ in range(150):
         vertices, triangles = random_triangles(rng, int(rng.integers(2, 4)))
         if vertices.shape[1] == 3:
             vertices[:, 2] = rng.choice([0.0, -0.0, 0.5, -3.7, 1e-300, -1e-300, 1e-42, 3e38])
@@ -64,7 +64,7 @@ def test_flat_depth_left_out_gives_the_same_bits(depth_test):
         assert (bits_of(never) == bits_of(always)).all()
         assert (never.barycentric() == always.barycentric()).all()
         n_flat += never.mask.any()
-    assert n_flat > 500
+    assert n_flat > 100
 
 
 def random_affine(rng):
@@ -79,7 +79,7 @@ def random_affine(rng):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_weights_without_w_have_the_same_bits(dtype, monkeypatch):
     rng = np.random.default_rng(2)
-    for _ in range(800):
+    for _ in range(200):
         n = int(rng.integers(1, 40))
         vertices = rng.uniform(-1.2, 1.2, (3 * n, 3)) * rng.choice([1.0, 1.0, 1e6], (3 * n, 1))
         vertices[rng.integers(0, 3 * n)] *= rng.choice([1.0, 1e30])

@@ -45,7 +45,7 @@ def test_overdraw_adversarial_scene_equals_reference(make):
         comparing.check_overdraw(scene)
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(pixel_scenes() | clip_scenes())
 def test_overdraw_any_scene_equals_reference(scene):
     comparing.check_overdraw(scene)

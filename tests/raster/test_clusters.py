@@ -95,7 +95,7 @@ def test_picture_has_the_same_bits(name, dtype):
     mesh = as_arrays(name, dtype)
     clusters = Clusters(*mesh)
     n_drawn = 0
-    for i, view in enumerate(cameras(rng, 40)):
+    for i, view in enumerate(cameras(rng, 20)):
         test = ("less", "greater")[i % 5 == 0]
         expected = draw(mesh, None, test, threads=1, **view)
         got = draw(mesh, clusters, test, threads=THREADS[i % len(THREADS)], **view)
@@ -104,7 +104,7 @@ def test_picture_has_the_same_bits(name, dtype):
         if i % 10 == 0:
             assert_same(got.barycentric(), expected.barycentric())
             assert_same(got.interpolate(mesh[0]), expected.interpolate(mesh[0]))
-    assert n_drawn > 10
+    assert n_drawn > 5
 
 
 def draw_forms(clusters, mesh, view, depth_test):
@@ -143,7 +143,7 @@ def test_bounds_of_depth_leave_the_bits_of_wide_pictures(isa, name):
         for i, view in enumerate(cameras(rng, 12)):
             size, test = ((700, 90), (450, 200), (129, 300))[i % 3], ("less", "greater")[i % 2]
             expected = draw(mesh, None, test, size, threads=1, **view)
-            got = draw(mesh, clusters, test, size, threads=THREADS[i % len(THREADS)], **view)
+            got = draw(mesh, clusters, test, size, threads=THREADS[i // 3 % len(THREADS)], **view)
             assert_same_fragments(got, expected)
 
 

@@ -16,7 +16,7 @@ from topleft.methods.reference import peel as ref_peel
 
 EXACT = {"subpixel_bits": "exact"}
 MODES = ["replace", "over", "add", "multiply", "max", "min"]
-fill, blend = kept(reference.fill), kept(ref_blend.blend)
+fill, blend, overdraw = kept(reference.fill), kept(ref_blend.blend), kept(reference.overdraw)
 
 
 def colors_of(n, n_channels, seed, dtype=np.uint8):
@@ -136,7 +136,7 @@ def test_layers_are_those_of_the_reference(isa, scene, seed, test):
         frags = tl.rasterize(*scene.arrays, depth_test=test, **scene.view)
     assert (layers.triangle[..., 0] == frags.triangle).all()
     assert (layers.depth[..., 0] == frags.depth).all()
-    assert (layers.count == np.minimum(3, reference.overdraw(*scene.arrays, **scene.view))).all()
+    assert (layers.count == np.minimum(3, overdraw(*scene.arrays, **scene.view))).all()
 
 
 def test_layers_by_index_are_those_of_the_reference():

@@ -167,7 +167,7 @@ def test_hidden_lines_equal_reference(depth_test, isa):
         scene = scene if name in CLIP_SCENES else with_depth(scene, np.random.default_rng(3))
         frags = tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view)
         hidden = {"depth_test": depth_test, "depth_bias": 2.0**-4}
-        expected = ref.wireframe(*scene.arrays, depth=frags.depth, **hidden, **scene.view)
+        expected = wireframe(*scene.arrays, depth=frags.depth, **hidden, **scene.view)
         with on(isa):
             assert_exact(tl.wireframe(*scene.arrays, depth=frags, threads=2, **hidden, **scene.view), expected)
 
@@ -178,7 +178,7 @@ def test_hidden_antialiased_lines_equal_exact_distances(depth_test, isa):
     scene = CLIP_SCENES["clip_soup"](np.random.default_rng(2), 6)
     frags = tl.rasterize(*scene.arrays, depth_test=depth_test, **scene.view)
     hidden = {"depth": frags.depth, "depth_test": depth_test, "antialias": True}
-    exact = ref.smooth_wireframe(*scene.arrays, depth=frags.depth, depth_test=depth_test, **scene.view)
+    exact = smooth_wireframe(*scene.arrays, depth=frags.depth, depth_test=depth_test, **scene.view)
     with on(isa):
         assert abs(tl.wireframe(*scene.arrays, **hidden, **scene.view) - exact).max() <= COVERAGE_SLACK
 

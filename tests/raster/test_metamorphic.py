@@ -15,7 +15,7 @@ MAKERS = pytest.mark.parametrize("make", (PIXEL_SCENES | CLIP_SCENES).values(), 
 PIXEL = pytest.mark.parametrize("make", PIXEL_SCENES.values(), ids=PIXEL_SCENES)
 
 
-def scenes_of(make, n=5):
+def scenes_of(make, n=3):
     """Seeded scenes; those in pixels get a depth, so that every verb has work to do."""
     for seed in range(n):
         rng = np.random.default_rng(1000 + seed)
@@ -108,7 +108,7 @@ def test_window_far_from_the_picture_is_empty():
 
 @MAKERS
 def test_edge_and_scanline_give_every_buffer_alike(make):
-    for scene, _ in scenes_of(make, 10):
+    for scene, _ in scenes_of(make, 5):
         expected = buffers(scene, method="edge")
         assert_same_buffers(buffers(scene, method="scanline"), expected)
         assert_same_buffers(buffers(scene), expected)
@@ -124,9 +124,9 @@ def test_least_triangle_covers_the_sample_in_its_corner(method, isa):
 
 @MAKERS
 def test_threads_give_every_buffer_alike(make):
-    for scene, _ in scenes_of(make, 3):
+    for scene, _ in scenes_of(make):
         expected = buffers(scene, threads=1)
-        for threads, is_sliced in ((2, False), (2, True), (3, True), (8, False), (8, True)):
+        for threads, is_sliced in ((2, False), (3, True), (8, False)):
             with sharing(is_sliced):
                 assert_same_buffers(buffers(scene, threads=threads), expected)
 

@@ -40,10 +40,11 @@ def test_levels_are_the_mean_over_the_facets():
     texels, rows = tl.Environment(image=image).levels
     at, angle = sphere()
     light = module.look_up_sphere(image.astype(np.float32), at.astype(np.float32))
+    some = DIRECTIONS[::4]
     for roughness in (0.25, 0.5, 0.75, 1.0):
-        weights = facets(DIRECTIONS @ at.T, roughness) * angle
+        weights = facets(some @ at.T, roughness) * angle
         expected = weights @ light / weights.sum(axis=1, keepdims=True)
-        got = reference.octahedral(texels, rows[int(roughness * module.N_ROUGH)], DIRECTIONS)
+        got = reference.octahedral(texels, rows[int(roughness * module.N_ROUGH)], some)
         # 64 directions, and texels between which light is linear; a picture of blocks of 22 degrees, light of 0 to 1
         assert np.abs(got - expected).max() < 0.03
         assert np.abs(got - expected).mean() < 0.006

@@ -18,7 +18,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.clusters import Clusters
 from topleft.methods.reference.integers import ExactPicture, projected, snapped
 
-THREADS = (1, 2, 3, 8)
+THREADS = (1, 2, 5)
 DEPTH_TESTS = ("less", "greater", None)
 
 
