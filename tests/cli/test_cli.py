@@ -286,6 +286,7 @@ def test_render_mesh_and_out_reversed_is_refused(run, folder):
     ("arguments", "line"),
     [
         (["nope.obj", "-o", "a.png"], "topleft: there is no file 'nope.obj'"),
+        (["https://a.b/c.obj", "-o", "a.png"], "topleft: path must be a file of this machine, got the URL"),
         (["dodo", "-o", "a.png"], "topleft: there is no file and no built-in shape 'dodo'; shapes: blob, cube, "),
         (["broken.obj", "-o", "a.png"], "topleft: cannot read 'broken.obj': broken, or not a '.obj' file"),
         (["empty.obj", "-o", "a.png"], "topleft: 'empty.obj' has no triangles"),

@@ -187,7 +187,7 @@ def test_load_folder_is_refused(tmp_path):
 
 
 def test_load_address_is_refused():
-    with pytest.raises(TypeError, match=r"path must be a file of this machine, got the URL 'https://.*obj'"):
+    with pytest.raises(FileNotFoundError, match=r"path must be a file of this machine, got the URL 'https://.*obj'"):
         files.load("https://example.com/a.obj")
 
 
