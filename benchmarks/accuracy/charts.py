@@ -30,7 +30,7 @@ PEER_LETTERS = {
 }  # fmt: skip
 """The text in the marker of a peer."""
 PEER_NAMES = {"opencv": "OpenCV", "pillow": "Pillow", "skimage": "scikit-image"}
-PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 10.5, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
+PEER_LOOK: dict[str, Any] = {"marker": "s", "ms": 12, "mfc": "#FFFBE6", "mec": "#8A1C1C", "mew": 1}
 SAMPLING_LABELS = {"center": "1", "msaa2": "2", "msaa4": "4", "msaa8": "8", "msaa16": "16", "area": "topleft, area"}
 
 
@@ -53,7 +53,7 @@ def chart_peers(record: dict[str, Any]) -> Figure:
             axis.plot(x, y, "o", color="black", ms=7)
             axis.annotate(f"topleft, {bits}", (x, y), (-7, 0), textcoords="offset points", ha="right", va="center")
     axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
-    axis.set(xscale="log", yscale="log", xlim=(5, 3e5), ylim=(none_wrong / 3, 3e6))
+    axis.set(xscale="log", yscale="log", xlim=(5, 1e6), ylim=(none_wrong / 3, 3e6))
     axis.set_title(family["what"], loc="left")
     axis.set(xlabel="time per triangle", ylabel="wrong of a million edge pixels (grey: none)")
     axis.xaxis.set_major_formatter(lambda value, _: duration(value))
@@ -93,7 +93,7 @@ def chart_coverage(record: dict[str, Any]) -> Figure:
         axis.set(xscale="log", yscale="log", ylim=(none_wrong / 3, 3e6))
         axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
         axis.text(0.99, none_wrong * 0.42, f"none wrong of {n_edge_px:,}", transform=axis.get_yaxis_transform(),
-                  ha="right", fontsize=7, color="0.35")  # fmt: skip
+                  ha="right", fontsize=8, color="0.35")  # fmt: skip
         times = [row["ns_triangle"] for row in rows + twins + peers]
         low, high = min(times), max(times)
         axis.set_xlim(low / (high / low) ** 0.38, high * (high / low) ** 0.06)
@@ -151,7 +151,7 @@ def draw_peer(axis: Axes, name: str, point: Point) -> None:
     """Draw the marker that only peers have, a square with a letter."""
     axis.plot(*point, **PEER_LOOK, zorder=5)
     axis.annotate(PEER_LETTERS.get(name, "?"), point, (0, -0.4), textcoords="offset points", ha="center", va="center",
-                  fontsize=6.5, color="#8A1C1C", fontweight="bold", zorder=6)  # fmt: skip
+                  fontsize=8, color="#8A1C1C", fontweight="bold", zorder=6)  # fmt: skip
 
 
 def peer_handles(rows: list[dict[str, Any]]) -> list[Line2D]:
