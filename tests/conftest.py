@@ -36,6 +36,7 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.path.relative_to(Path(__file__).parents[1]).as_posix() not in SLOW:
             item.add_marker(pytest.mark.quick)
+    items.sort(key=lambda item: item.path.parent.name != "trust")  # half a minute each: no core waits for the last
 
 
 @pytest.fixture

@@ -661,7 +661,7 @@ def test_gltf_of_draco_that_declares_too_much_is_refused_before_it_is_unpacked(t
 
 
 @pytest.mark.parametrize("level", [0, 1, 7, 10])
-@pytest.mark.parametrize("n", [1, 3, 200, 260])
+@pytest.mark.parametrize("n", [1, 3, 260])
 def test_draco_attributes_are_found_behind_the_connectivity(level, n):
     n_vertices = (n + 1) ** 2
     uv = np.random.default_rng(n).uniform(0, 1, (n_vertices, 2))
@@ -675,13 +675,13 @@ def test_draco_attributes_are_found_behind_the_connectivity(level, n):
 
 @pytest.mark.parametrize("level", [0, 7])
 def test_gltf_of_draco_with_more_attributes_than_its_vertices_allow_is_refused(tmp_path, monkeypatch, level):
-    """As a file of 58 kB, which took 1 GB."""
-    own = {k: np.zeros((201**2, 120), np.uint32) for k in range(4)}
-    content, *n = grid_of_draco(200, compression_level=level, generic_attributes=own)
+    """As a file of 58 kB of 201**2 vertices, which took 1 GB."""
+    own = {k: np.zeros((101**2, 120), np.uint32) for k in range(4)}
+    content, *n = grid_of_draco(100, compression_level=level, generic_attributes=own)
     monkeypatch.setattr("DracoPy.decode", lambda content: pytest.fail("it was unpacked"))
     tmp_path.joinpath("a.glb").write_bytes(draco_file(content, *n).glb())
-    with pytest.raises(MeshError, match=r"has (1219605|7245000) vertices, more than the 1000000 of max_vertices"):
-        tl.load(tmp_path / "a.glb", max_vertices=1_000_000)
+    with pytest.raises(MeshError, match=r"has (307942|1811250) vertices, more than the 250000 of max_vertices"):
+        tl.load(tmp_path / "a.glb", max_vertices=250_000)
 
 
 def test_gltf_of_draco_counts_the_attributes_of_all_parts(tmp_path):

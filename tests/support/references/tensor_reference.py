@@ -27,14 +27,14 @@ def rasterize(pos, tri, height, width):
     rast, rast_db = np.zeros((2, height, width, 4))
     is_close = np.zeros((height, width), bool)
     size = np.array([width / 2, height / 2])
+    edges_of = [planes(pos[row]) for row in tri]
+    slopes_of = [np.linalg.norm(edges[:, :2] / size, axis=1) for edges in edges_of]
     for i, j in np.ndindex(height, width):
         x, y = center(i, j, height, width)
         nearest = math.inf
-        for k, row in enumerate(tri):
+        for k, (row, edges, slopes_px) in enumerate(zip(tri, edges_of, slopes_of, strict=True)):
             corners = pos[row]
-            edges = planes(corners)
             areas = edges @ [x, y, 1]
-            slopes_px = np.linalg.norm(edges[:, :2] / size, axis=1)
             is_close[i, j] |= bool((np.abs(areas) < slopes_px / 64).any())
             weights = areas / areas.sum()
             z, w = corners[:, 2:].T @ weights

@@ -150,13 +150,15 @@ def mean(
     [255, 128]
     """
     n_colors = samples.shape[1] - (samples.shape[1] in (2, 4))
-    alpha = [Fraction(float(sample[-1])) for sample in samples]
+    number: Callable[[Any], Any] = Fraction if samples.dtype.kind == "f" else int
+    alpha = [number(a) for a in samples[:, -1].tolist()]
     is_weighted = is_straight and len(set(alpha)) > 1 and sum(alpha) != 0
     channels: list[float] = []
     for c, values in enumerate(samples.T):
-        weights = alpha if is_weighted and c < n_colors else [Fraction(1)] * len(samples)
+        weights = alpha if is_weighted and c < n_colors else [1] * len(samples)
         light = tables[0][values] if tables and c < n_colors else values
-        exact = sum(w * Fraction(v) for w, v in zip(weights, light.tolist(), strict=True)) / sum(weights)
+        total = sum(w * number(v) for w, v in zip(weights, light.tolist(), strict=True))
+        exact = Fraction(total) / sum(weights)
         if samples.dtype != np.uint8:
             channels.append(float(exact))
         else:
