@@ -17,6 +17,12 @@ PAGE = PAGES / "planner.md"
 """With the marker of the plan."""
 
 
+def make_plan() -> tl.Plan:
+    """Return the plan of the page."""
+    camera = tl.Camera.framing(mesh := tl.Mesh(*blob(1_000_000)), aspect=16 / 9)
+    return tl.plan(mesh, camera, (1920, 1080), threads=1)
+
+
 def plan_text(record: Record) -> str:
     """The plan, as it is printed."""
     return f"```\n{record['plan']}\n```"
@@ -31,8 +37,7 @@ class PlannerOptions:
 
 def run(options: PlannerOptions, _: Save) -> Record:
     """Make a plan, draw it, and write it into the page."""
-    camera = tl.Camera.framing(mesh := tl.Mesh(*blob(1_000_000)), aspect=16 / 9)
-    record = {"kind": "planner", "plan": tl.plan(mesh, camera, (1920, 1080), threads=1).measure().explain()}
+    record = {"kind": "planner", "plan": make_plan().measure().explain()}
     write_text(options.out, with_parts(PAGE.read_text(encoding="utf-8"), record, STUDY.parts))
     return record
 
