@@ -148,6 +148,11 @@ TL_KERNEL(void, merge_fragments, const tl_merge *merge, int64_t first, int64_t e
 
 /* Replaces ids [first, end) by names[1 + id]. */
 TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const int32_t *names)
+
+/* Draws n alpha-tested triangles over a target, NEAREST or PEEL, that has all other triangles; the window as for a
+ * slice, and fewer than 2^31 pixels. */
+TL_KERNEL(void, cut_out, const tl_snapped *snapped, const tl_window *window, const tl_view *view,
+          const tl_shading *shading, const int32_t *triangles, int64_t n, const tl_target *target)
 #endif
 
 #if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_pixels
@@ -260,11 +265,6 @@ TL_KERNEL(void, shade_samples, const tl_shaded_scene *scene, const tl_window *wi
 /* Writes unit normals on the visible side, float32 (x, y, z), 0 for the background, rotated by shading->eye_from; show
  * is NORMALS. */
 TL_KERNEL(void, shade_normals, const tl_shaded_scene *scene, const tl_window *window, const int32_t *ids, float *out)
-
-/* Draws n alpha-tested triangles over a target, NEAREST or PEEL, that has all other triangles; the window as for a
- * slice, and fewer than 2^31 pixels. */
-TL_KERNEL(void, cut_out, const tl_snapped *snapped, const tl_window *window, const tl_view *view,
-          const tl_shading *shading, const int32_t *triangles, int64_t n, const tl_target *target)
 #endif
 
 #if !TL_KERNELS_OF || TL_KERNELS_OF == TL_UNIT_polygons

@@ -1,4 +1,5 @@
-/* A unit: vertices and triangles to covered samples, exact areas, points and lines; windows of huge rasters. */
+/* A unit: vertices and triangles to covered samples, exact areas, points and lines; windows of huge rasters; the alpha
+ * test, which draws triangle by triangle. */
 #include "topleft.h"
 
 #include "vertex/clip.c"
@@ -19,5 +20,6 @@
 #include "tiles/corners.c"
 #include "tiles/merge.c"
 #include "tiles/spans.c"
+#include "shade/alpha_test.c"
 
 #include "unit.h"

@@ -1,7 +1,6 @@
 /* A unit: materials and light. */
 #include "topleft.h"
 
-#include "shade/alpha_test.c"
 #include "shade/shade.c"
 #include "shade/shade_samples.c"
 
