@@ -8,7 +8,8 @@ flags, so `BuildTopleft` compiles each unit by itself and links the objects.
 
 Environment:
 
-TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them; an error when it cannot be
+TOPLEFT_BUILD_ISA   comma list of the instruction sets to build, scalar always among them, an error when it cannot be;
+                    "all": a wheel for other machines; without it the sets that this machine runs
 TOPLEFT_WERROR      "1" turns warnings into errors
 TOPLEFT_SANITIZE    sanitizers of the compiler, as of -fsanitize=; `.ci/sanitize` builds with them and runs the tests
 TOPLEFT_URL         the address of the repository, for links and pictures in the metadata; the release workflow knows it
@@ -25,7 +26,7 @@ import sys
 import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
 
@@ -129,12 +130,11 @@ ISAS = [
 ]
 
 
-def wanted_isas() -> set[str] | None:
-    """Return the instruction sets named by TOPLEFT_BUILD_ISA, None when the compiler shall decide."""
-    text = os.environ.get("TOPLEFT_BUILD_ISA", "").strip()
-    if not text:
-        return None
-    names = {name.strip() for name in text.split(",") if name.strip()}
+def wanted_isas() -> set[str]:
+    """Return the instruction sets named by TOPLEFT_BUILD_ISA, {"all"}, or none when the machine shall decide."""
+    names = {name.strip() for name in os.environ.get("TOPLEFT_BUILD_ISA", "").split(",") if name.strip()}
+    if not names or names == {"all"}:
+        return names
     known = list(dict.fromkeys(isa.name for isa in ISAS))
     if unknown := sorted(names - set(known)):
         raise PlatformError(f"TOPLEFT_BUILD_ISA must list some of {', '.join(known)}, got {', '.join(unknown)}")
@@ -296,20 +296,29 @@ class BuildTopleft(build_ext):
         return [(ext, FLAGS_CLASSIC, []), (ROOT / Path(ext.sources[0]).with_name("steps.c"), FLAGS_C, [])]
 
     def isas_to_build(self, pool: ThreadPoolExecutor) -> list[Isa]:
-        """Return the kernel units to build: those asked for, or all that the compiler can build."""
+        """Return the sets to build: those asked for, all that the compiler can build, or those of this machine."""
         wanted = wanted_isas()
-        accepted = pool.map(self.can_build, ISAS)
-        chosen = [
-            isa
-            for isa, is_accepted in zip(ISAS, accepted, strict=True)
-            if is_accepted and (isa.is_built_unasked if wanted is None else isa.name in wanted)
-        ]
-        names = {isa.name for isa in chosen}
+        accepted = [isa for isa, is_accepted in zip(ISAS, pool.map(self.can_build, ISAS), strict=True) if is_accepted]
+        names = {isa.name for isa in accepted}
         if "scalar" not in names:
             raise CompileError("topleft needs gcc or clang with C11, and a machine without excess precision")
-        if missing := sorted((wanted or names) - names):
+        if missing := sorted(wanted - names - {"all"}):
             raise CompileError(f"TOPLEFT_BUILD_ISA asks for {', '.join(missing)}, which this compiler cannot build")
-        return chosen
+        unasked = [isa for isa in accepted if isa.is_built_unasked]
+        if wanted == {"all"}:
+            return unasked
+        return [isa for isa in accepted if isa.name in wanted] if wanted else self.of_this_machine(unasked)
+
+    def of_this_machine(self, isas: list[Isa]) -> list[Isa]:
+        """Return the sets that this machine runs; all where the compiler builds for other machines.
+
+        A machine takes the widest. Scalar is then there to be compared with, and has -O1, as vectors of 128 bits.
+        """
+        native = [*FLAGS_C, "-march=native"]
+        if not self.accepts(native, ""):
+            return isas
+        scalar, *wider = [isa for isa in isas if self.accepts(native, isa.probe)]
+        return [replace(scalar, flags=["-O1", "-Wno-maybe-uninitialized"]), *wider] if wider else [scalar]
 
     def can_build(self, isa: Isa) -> bool:
         """Whether the compiler builds for the target of a unit, which may be no machine like this, and the unit."""

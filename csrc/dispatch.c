@@ -123,10 +123,8 @@ const char *tl_isa_flags(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA ? UN
 
 int tl_isa_built(int i_isa) { return i_isa >= 0 && i_isa < TL_N_ISA && UNITS[i_isa].set != NULL; }
 
-int tl_isa_available(int i_isa)
+int tl_isa_runs(int i_isa)
 {
-    if (!tl_isa_built(i_isa))
-        return 0;
     switch (i_isa) {
     case TL_ISA_SIMD128: return cpu_has_simd128();
     case TL_ISA_AVX2: return cpu_has_avx2();
@@ -138,7 +136,7 @@ int tl_isa_available(int i_isa)
 int tl_set_kernels(const char *name, tl_kernels *kernels)
 {
     for (int i = 0; i < TL_N_ISA; i++)
-        if (strcmp(UNITS[i].name, name) == 0 && tl_isa_available(i)) {
+        if (strcmp(UNITS[i].name, name) == 0 && tl_isa_built(i) && tl_isa_runs(i)) {
             kernels->isa = UNITS[i].name;
             UNITS[i].set(kernels);
             return 1;

@@ -43,7 +43,8 @@ def build() -> dict[str, float]:
     """Seconds that a wheel with every instruction set takes to build, and its MB."""
     with tempfile.TemporaryDirectory() as folder:
         start = time.monotonic()
-        subprocess.run([sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT], check=True)
+        command = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT]
+        subprocess.run(command, env=os.environ | {"TOPLEFT_BUILD_ISA": "all"}, check=True)
         seconds = time.monotonic() - start
         (wheel,) = Path(folder).glob("*.whl")
         return {"seconds": round(seconds), "MB": round(wheel.stat().st_size / 1e6, 1)}

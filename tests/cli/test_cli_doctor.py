@@ -19,6 +19,13 @@ def test_doctor_tells_version_and_each_instruction_set(capsys):
     assert isa_in_use() == info["isa"]
 
 
+def test_doctor_tells_the_sets_that_the_build_lacks(capsys, monkeypatch):
+    info = build_info() | {"isa_missing": ["avx512"]}
+    monkeypatch.setattr("topleft._apps.cli.doctor.build_info", lambda: info)
+    topleft.cli.main(["doctor"])
+    assert "  avx512: not built, though this machine runs it; `TOPLEFT_BUILD_ISA=all" in capsys.readouterr().out
+
+
 def test_doctor_exits_with_1_when_a_picture_is_wrong(capsys, monkeypatch):
     monkeypatch.setattr(testing, "GOLDEN", testing.GOLDEN.replace("depth:", "depth:0"))
     assert topleft.cli.main(["doctor"]) == 1

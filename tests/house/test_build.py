@@ -1,4 +1,4 @@
-"""What `setup.py` builds: the instruction sets of the machine that its compiler builds for, wherever it runs."""
+"""What `setup.py` builds: the instruction sets of the machine that its compiler builds for."""
 
 import os
 import platform
@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 from toolchain import compiler
+
+import topleft as tl
 
 ROOT = Path(__file__).parents[2]
 LIST_ISAS = """
@@ -41,6 +43,13 @@ def test_build_for_aarch64_has_its_vectors_wherever_it_runs():
 
 def test_build_for_webassembly_has_its_vectors():
     assert list_isas("clang", "--target=wasm32-wasi").stdout.split() == ["scalar", "simd128"]
+
+
+@pytest.mark.skipif(not IS_X86, reason="of x86-64")
+def test_a_build_has_the_sets_of_its_machine_unless_all_are_asked_for():
+    assert list_isas(*compiler(), TOPLEFT_BUILD_ISA="all").stdout.split() == ["scalar", "avx2", "avx512"]
+    runs = [*tl.build_info()["isa_available"], *tl.build_info()["isa_missing"]]
+    assert list_isas(*compiler()).stdout.split() == [name for name in ("scalar", "avx2", "avx512") if name in runs]
 
 
 @pytest.mark.skipif(not IS_X86, reason="of x86-64")

@@ -145,7 +145,7 @@ def test_classics_use_no_engine():
 
 
 def test_build_info_has_the_documented_keys():
-    assert list(tl.build_info()) == ["version", "compiler", "flags", "isa_built", "isa_available", "isa"]
+    assert list(tl.build_info()) == ["version", "compiler", "flags", "isa_built", "isa_available", "isa_missing", "isa"]
 
 
 def test_build_info_names_isas_from_plain_to_wide():
@@ -153,6 +153,12 @@ def test_build_info_names_isas_from_plain_to_wide():
     assert info["isa_built"] == [isa for isa in ISAS if isa in info["isa_built"]]
     assert info["isa_available"] == [isa for isa in info["isa_built"] if isa in info["isa_available"]]
     assert "scalar" in info["isa_available"]
+
+
+def test_build_info_missing_isas_are_wider_than_all_available():
+    info = tl.build_info()
+    assert not set(info["isa_missing"]) & set(info["isa_built"])
+    assert all(ISAS.index(isa) > ISAS.index(info["isa_available"][-1]) for isa in info["isa_missing"])
 
 
 def test_build_info_flags_of_each_unit_forbid_contraction():

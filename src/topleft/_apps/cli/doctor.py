@@ -41,6 +41,8 @@ def run_doctor(_: argparse.Namespace) -> int:
     for name in info["isa_built"]:
         told = found.get(name, "this machine cannot run it")
         print(f"  {name}: {told}{', in use' if name == info['isa'] else ''}")
+    for name in info["isa_missing"]:
+        print(f"  {name}: not built, though this machine runs it; `TOPLEFT_BUILD_ISA=all pip install ...` does")
     is_right = set(found.values()) == {"right"}
     told = "all is well" if is_right else "PICTURES ARE WRONG, please report this"
     print(f"{told} ({time.perf_counter() - start:.1f} s)")

@@ -35,8 +35,8 @@ def build_info() -> dict[str, Any]:
     -------
     dict
         ``version``; ``compiler``; ``flags``, the compiler flags of each kernel unit; ``isa_built``, the instruction
-        sets in the binary; ``isa_available``, the sets that this machine can run; ``isa``, the set in use. All
-        instruction sets compute equal bits.
+        sets in the binary; ``isa_available``, those that this machine can run; ``isa_missing``, wider sets that it
+        can run and that the binary lacks; ``isa``, the set in use. All instruction sets compute equal bits.
 
     Examples
     --------
@@ -49,6 +49,7 @@ def build_info() -> dict[str, Any]:
         **kernels.compiler_info(),
         "isa_built": kernels.isa_built(),
         "isa_available": kernels.isa_available(),
+        "isa_missing": kernels.isa_missing(),
         "isa": kernels.isa_in_use(),
     }
 

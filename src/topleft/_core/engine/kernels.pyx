@@ -44,7 +44,13 @@ def isa_built() -> list[str]:
 
 def isa_available() -> list[str]:
     """Return the instruction sets in this binary that this machine can run, the plainest first."""
-    return [tl_isa_name(i).decode() for i in range(TL_N_ISA) if tl_isa_available(i)]
+    return [tl_isa_name(i).decode() for i in range(TL_N_ISA) if tl_isa_built(i) and tl_isa_runs(i)]
+
+
+def isa_missing() -> list[str]:
+    """Return the instruction sets that this machine can run, wider than those available, that this binary lacks."""
+    widest = max(i for i in range(TL_N_ISA) if tl_isa_built(i) and tl_isa_runs(i))
+    return [tl_isa_name(i).decode() for i in range(widest + 1, TL_N_ISA) if tl_isa_runs(i)]
 
 
 def compiler_info() -> dict[str, object]:
