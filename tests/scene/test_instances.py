@@ -11,7 +11,6 @@ from engine_cases import ON_EACH_ISA, on, one_by_one
 import topleft as tl
 from topleft._core import engine
 from topleft._meshes.picture import draw_scene
-from topleft._meshes.picture import placed as placed_scenes
 from topleft._meshes.picture.placed import Placed
 
 TURNED = {"none": "none", "back": "front", "front": "back"}
@@ -47,33 +46,6 @@ def drawn_one_by_one(scene, camera, cull, **options):
         depth = np.where(is_nearer, frags.samples_depth, depth)
         ids = np.where(is_nearer, frags.samples_triangle + first, ids)
     return ids, depth
-
-
-@ON_EACH_ISA
-@pytest.mark.parametrize("sampling", ["center", "msaa2", "msaa8"])
-@pytest.mark.parametrize("bits", [8, "exact"])
-def test_scene_drawn_as_one_mesh_is_that_of_its_instances(isa, sampling, bits, monkeypatch):
-    rng = np.random.default_rng(5)
-    cube = tl.Mesh(*tl.scenes.shape("cube"))
-    ball, empty = tl.Mesh(*tl.scenes.icosphere(2)), tl.Mesh(np.zeros((3, 3)), np.empty((0, 3), np.int32))
-    places = np.tile(np.eye(4), (7, 1, 1))
-    places[:, :3, 3] = rng.uniform(-1, 1, (7, 3))
-    scene = tl.Scene(
-        tl.Instance(mesh, place)
-        for mesh, place in zip([empty, ball, cube, ball, empty, ball, cube], places, strict=True)
-    )
-    camera, options = tl.Camera.look_at((0, 1, 6)), {"sampling": sampling, "subpixel_bits": bits, "threads": 3}
-
-    def pictures():
-        frags = tl.rasterize_mesh(scene, camera, (67, 131), **options)
-        return frags.samples_id, frags.samples_depth, tl.render(scene, camera, (67, 131), **options)
-
-    with on(isa):
-        joined = pictures()
-        monkeypatch.setattr(placed_scenes, "TRIANGLES_AT_ONCE", 0)
-        for found, expected in zip(joined, pictures(), strict=True):
-            assert_same(found, expected)
-    assert len(np.unique(joined[0])) > 100
 
 
 @ON_EACH_ISA

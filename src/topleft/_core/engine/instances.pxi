@@ -35,7 +35,7 @@ cdef class PlacedMeshes:
     points (V, PLACED) float64, which are not snapped; from vertex firsts[i] on for instance i.
     """
 
-    cdef object arrays, room
+    cdef object arrays
     cdef Viewport viewport
     cdef uint8_t[::1] raw, source_room, mesh_room, is_apart
     cdef const double[:, :, ::1] matrices
@@ -52,7 +52,7 @@ cdef class PlacedMeshes:
                  how: tuple[int, int, int, int, int, int], room: Array, const int64_t[::1] firsts):
         cdef int64_t i, n = matrices.shape[0]
         cdef int method
-        self.viewport, self.room, self.is_exact, self.raw = viewport, room, room.dtype == np.float64, as_bytes(room)
+        self.viewport, self.is_exact, self.raw = viewport, room.dtype == np.float64, as_bytes(room)
         self.matrices, self.firsts, self.rounded = matrices, firsts, np.empty((max(1, n), 16), np.float32)
         self.is_apart = np.array(is_apart)
         self.source_room = np.empty(max(1, n) * sizeof(tl_source), np.uint8)
@@ -100,13 +100,6 @@ cdef class PlacedMeshes:
             counts = K.project(&self.sources[i], 0, self.sources[i].n, &self.viewport.view, &out)
             self.is_apart[i] = counts.n_bad + counts.n_wide + counts.n_clipped > 0
 
-    def count_left_out(self) -> int:
-        """Return how many triangles the skipped instances have."""
-        cdef int64_t i, n = 0
-        for i in range(self.is_apart.shape[0]):
-            n += self.meshes[i].n_triangles if self.is_apart[i] else 0
-        return n
-
     def mesh(self, int64_t i) -> SnappedMesh | None:
         """Return an instance ready to be drawn; None if it was skipped."""
         if self.is_apart[i]:
@@ -114,22 +107,6 @@ cdef class PlacedMeshes:
         cdef SnappedMesh instance = self.like(i)
         if self.is_exact:
             self.set_points(instance, <double *>self.place(i), instance.snapped.mesh.n_vertices)
-        return instance
-
-    def joined(self, int64_t first, const int32_t[:, ::1] triangles) -> SnappedMesh:
-        """Return instances joined to a mesh that can only be drawn, culled and numbered as instance `first` is.
-
-        `triangles`: of these instances, indices of the vertices in `room`.
-        """
-        cdef SnappedMesh instance = self.like(first)
-        cdef int64_t n_vertices = self.firsts[self.is_apart.shape[0]]
-        instance.arrays = self.room, triangles
-        instance.snapped.mesh.source, instance.snapped.mesh.n_vertices = NULL, n_vertices
-        instance.snapped.triangles, instance.snapped.n_triangles = &triangles[0, 0], triangles.shape[0]
-        if self.is_exact:
-            self.set_points(instance, <double *>&self.raw[0], n_vertices)
-        else:
-            instance.snapped.mesh.vertices = <const tl_vertex *>&self.raw[0]
         return instance
 
     cdef SnappedMesh like(self, int64_t i):

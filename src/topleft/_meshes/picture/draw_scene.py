@@ -1,4 +1,4 @@
-"""Draws ids and depth of a placed scene: joined, in rounds of whole instances, or in rounds of clusters.
+"""Draws ids and depth of a placed scene: in rounds of whole instances, or in rounds of clusters.
 
 In: `Placed`, the options of `rasterize`.  Out: `Fragments`; or any targets, for masks.
 """
@@ -22,8 +22,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.cluster_draw import BoxView, Survey, draw_clustered, equal_bands
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import DEFAULT_OPTIONS, FragmentOptions, draw_fragments
-from topleft._core.raster.sampling import SamplePass, draw_sorted, lay_background
-from topleft._core.raster.snap import refuse_changed
+from topleft._core.raster.sampling import lay_background
 from topleft._core.raster.static_mesh import draw_static
 from topleft._meshes.picture.placed import Placed
 from topleft._meshes.scene.scene import Scene, unchecked_scene
@@ -148,15 +147,7 @@ def draw_part(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool
         memories = [KeptMemory() for _ in range(count_parts(placed))]
         if all(draw_clusters(placed, order, target, memories, is_first=is_first) for target in targets):
             return
-    if len(targets) > 1 and len(placed.joined) == 1 and choices.can_slice(view) and is_first:
-        positions = np.array([at for _, at in targets], np.int32)
-        own = SamplePass(FRESH, placed.joined[0], positions, count_parts(placed))
-        if draw_sorted(own, [target for target, _ in targets], shape):
-            refuse_changed()
-    elif placed.joined:
-        draw_meshes(placed, placed.joined, targets, is_first=is_first)
-    else:
-        draw_instances(placed, targets, is_first=is_first)
+    draw_instances(placed, targets, is_first=is_first)
 
 
 def draw_instances(placed: Placed, targets: Sequence[SampleTarget], *, is_first: bool) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
@@ -37,12 +36,6 @@ from topleft._meshes.scene.scene import Instance, Scene
 
 #: Snapped vertices that are held at a time: 16 bytes each.
 VERTICES_AT_ONCE = 1 << 20
-
-#: Triangles of a scene that are kept in one array, 12 bytes each.
-TRIANGLES_AT_ONCE = 1 << 21
-
-#: Runs of instances that cull alike, each drawn as one mesh.
-MOST_JOINED = 8
 
 #: cull codes of a view (tl_cull) for an instance or a camera that mirrors.
 MIRRORED = np.array([0, 2, 1], np.int32)
@@ -102,8 +95,6 @@ class Placed:
     """The last instance that was needed, and its view: often thrice in turn."""
     _n_kept: int = field(default=0, init=False)
     """Vertices of the snapped instances that are kept."""
-    _all: engine.PlacedMeshes | None = field(default=None, init=False)
-    """The instances of a small scene, once they have been joined."""
 
     @classmethod
     def of(
@@ -137,9 +128,9 @@ class Placed:
 
     def __getstate__(self) -> dict[str, Any]:
         """The state for another process, which makes views of instances itself."""
-        made = ("joined", "_kept", "_sides_of_looks")
+        made = ("_kept", "_sides_of_looks")
         own = {name: value for name, value in vars(self).items() if name not in made}
-        return own | {"_last": None, "_n_kept": 0, "_all": None}
+        return own | {"_last": None, "_n_kept": 0}
 
     __setstate__ = set_aligned
 
@@ -202,8 +193,6 @@ class Placed:
     def _snap(self, some: NDArray[np.intp]) -> list[engine.SnappedMesh | None]:
         """Return some instances, all in one call; None for an instance that is to be snapped alone."""
         numbers = some.tolist()
-        if self._all is not None:
-            return [self._kept.get(i) or self._all.mesh(i) for i in numbers]
         if all(i in self._kept for i in numbers):
             return [self._kept[i] for i in numbers]
         placed = self._project(some)
@@ -240,24 +229,6 @@ class Placed:
     @cached_property
     def _vertex_counts(self) -> NDArray[np.int64]:
         return np.diff(self.scene.first_vertices)
-
-    @cached_property
-    def joined(self) -> list[engine.SnappedMesh]:
-        """All instances as a few meshes, one for each run that culls alike; none of large or clipped scenes."""
-        scene, culls = self.scene, self.sides[0]
-        is_end = culls[1:] != culls[:-1]
-        if self.given_numbers is not None:  # the ids of a joined mesh count on
-            is_end = is_end | (np.diff(self.given_numbers) != np.diff(scene.first_ids)[:-1])
-        starts = [0, *(np.flatnonzero(is_end) + 1).tolist()]
-        is_small = scene.first_vertices[-1] <= VERTICES_AT_ONCE and 0 < scene.n_triangles <= TRIANGLES_AT_ONCE
-        if not is_small or len(starts) > MOST_JOINED:
-            return []
-        self._all = placed = self._project(np.arange(len(scene)))
-        if placed is None or placed.count_left_out():
-            return []
-        triangles, ends = scene.joined_triangles, pairwise(scene.first_ids[[*starts, len(scene)]].tolist())
-        runs = zip(starts, ends, strict=True)
-        return [placed.joined(i, triangles[first:end]) for i, (first, end) in runs if first < end]
 
     def _snap_alone(self, i: int) -> engine.SnappedMesh:
         mesh = self.scene[i].mesh
@@ -316,8 +287,7 @@ class Placed:
         self, some: NDArray[np.intp], triangles_of: Callable[[int], NDArray[np.int32]]
     ) -> list[engine.SnappedMesh]:
         """Return some instances snapped; of a large mesh in clusters the part with some triangles."""
-        is_snapped = self._all is not None
-        in_clusters = [not (is_snapped or i in self._kept) and self._is_clustered(i) for i in some.tolist()]
+        in_clusters = [i not in self._kept and self._is_clustered(i) for i in some.tolist()]
         n_pixels = self.view.size[0] * self.view.size[1]
         is_large = np.array(
             [
@@ -391,7 +361,3 @@ class Placed:
             end = int(max(end, first + 1))
             yield order[first:end]
             first, n_most = end, 2 * n_most
-
-    def meshes(self) -> Iterator[list[engine.SnappedMesh]]:
-        """Yield what is drawn, in the order of ids: all instances joined, or else `chunks`."""
-        return iter([self.joined]) if self.joined else self.chunks()

@@ -148,7 +148,7 @@ def peel_shot(
         mesh = shot.scene[0].mesh
         return draw_layers_of(mesh.vertices, mesh.triangles, placed.view_of(0), layers, depth_test)
     n, is_farthest = check_peel(placed.view, layers, depth_test)
-    planes = peel_meshes(SCRATCH, placed.meshes(), placed.view, n, is_farthest=is_farthest)
+    planes = peel_meshes(SCRATCH, placed.chunks(), placed.view, n, is_farthest=is_farthest)
     return SceneDepthLayers(*planes, placed)
 
 

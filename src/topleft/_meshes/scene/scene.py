@@ -136,16 +136,15 @@ vars(IN_PLACE)["is_mirrored"] = False  # as copies know
 class SceneCache:
     """Values computed of one scene for its next pictures: scenes made of it by `with_transforms` share them.
 
-    They go with the last of these scenes; no copy or pickle has them. Memory, for N instances, T triangles of all
-    instances and M different meshes: `joined_triangles` takes 12 T bytes, `first_vertices` 8 N, `mesh_list` about 64 M,
-    each of `sides` 5 N; `cuts` and `blended` refer to values of the meshes. Threads share it as they do a `MeshCache`.
+    They go with the last of these scenes; no copy or pickle has them. Memory, for N instances and M different
+    meshes: `first_vertices` takes 8 N bytes, `mesh_list` about 64 M, each of `sides` 5 N; `cuts` and `blended` refer to
+    values of the meshes. Threads share it as they do a `MeshCache`.
     """
 
     def __init__(self) -> None:
         self.is_drawn_often = False
         """Whether pictures have drawn each mesh so often that clusters pay."""
         self.first_vertices: npt.NDArray[np.int64] | None = None
-        self.joined_triangles: npt.NDArray[np.int32] | None = None
         self.mesh_list: tuple[engine.MeshList, npt.NDArray[np.int64]] | None = None
         self.sides: dict[tuple[int, bool], tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]] = {}
         """By `cull` and whether materials decide: the `tl_cull` of each instance unless mirrored, which are mixed."""
@@ -244,17 +243,6 @@ class Scene:
         found = self.cache.first_vertices
         if found is None:
             found = self.cache.first_vertices = self._firsts(lambda mesh: len(mesh.vertices))
-        return found
-
-    @property
-    def joined_triangles(self) -> npt.NDArray[np.int32]:
-        """The triangles of all instances, by vertices as `first_vertices` counts them: (T, 3) int32."""
-        found = self.cache.joined_triangles
-        if found is None:
-            meshes, of_instance = self._numbered
-            found = np.concatenate([meshes[k].triangles for k in of_instance.tolist()])
-            found += np.repeat(self.first_vertices[:-1].astype(np.int32), np.diff(self.first_ids))[:, None]
-            self.cache.joined_triangles = found
         return found
 
     @property
