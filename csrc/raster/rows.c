@@ -235,11 +235,6 @@ TL_WALK_COPIES(flush_middle)
 
 /* ---- boxes of up to 62 x 62 samples ---------------------------------------------------------------------- */
 
-/* Whether rows are drawn as spans, one by one, each with as few vectors as it needs; else in blocks of TL_LANES rows
- * and columns: more vectors, and fewer mispredicted branches.  Zen 4: by spans labels of 20,000 triangles of 40 px take
- * 0.77 of the time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
-#define TL_BY_SPANS(sink) (TL_LANES < 16 || !sink_has_depth(sink))
-
 /* The depths of columns from col0 on, to be added to those of rows. */
 TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int col0, double unit)
 {
@@ -247,7 +242,9 @@ TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int
     return vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
 }
 
-/* Draws the samples [first, end) of up to TL_LANES rows. */
+/* Draws the samples [first, end) of up to TL_LANES rows, a row at a time: each has as few vectors as it needs.  Blocks of
+ * rows and columns have more vectors and fewer mispredicted branches; Zen 4: labels of 20,000 triangles of 40 px take
+ * 0.77 of their time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
 TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi end, int n_rows, const double *z_row,
                           int64_t at, const double *z_cols, int32_t id)
 {
@@ -266,27 +263,6 @@ TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi en
     }
 }
 
-/* Draws the samples [first, end) of up to TL_LANES rows in blocks of TL_LANES columns. */
-TL_INLINE void draw_blocks(tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r, int64_t k,
-                           vi first, vi end, int n_cols, const double *z_row, int64_t at, double unit, int32_t id)
-{
-    const vi zero = vi_set1(0);
-    int32_t bits[TL_MAX_LANES];
-    for (int col0 = 0; col0 < n_cols; col0 += TL_LANES) {
-        const int width = n_cols - col0 < TL_LANES ? n_cols - col0 : TL_LANES;
-        const vi in_block = vi_bit_ranges(vi_max(vi_sub(first, vi_set1(col0)), zero),
-                                          vi_max(vi_min(vi_sub(end, vi_set1(col0)), vi_set1(width)), zero));
-        const unsigned drawn = vm_bits(vi_gt(in_block, zero));
-        if (!drawn)
-            continue;
-        const int begin = __builtin_ctz(drawn), n = 32 - __builtin_clz(drawn) - begin;
-        double z_cols[TL_LANES];
-        vd_store(z_cols, depths_of_columns(g, r, k, col0, unit));
-        vi_store(bits, in_block);
-        draw_block(target, sink, bits + begin, z_row + begin, 1, at + col0 + begin * target->stride_px, n, z_cols, id);
-    }
-}
-
 /* Draws triangle i + k of the queue, TL_LANES rows at a time.  With an int for k, gcc spills one more register in the
  * copy for masks: 3 % of its time on AVX-512. */
 TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, tl_sink sink, const row_edges *r,
@@ -300,7 +276,7 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
     const vm third_is_left = vi_gt(zero, vi_set1(r->third_is_left[k]));
     const vm third_is_right = vi_gt(zero, vi_set1(r->third_is_right[k]));
     double z_row[TL_MAX_LANES], z_cols[TL_MAX_BOX_PX + TL_MAX_LANES];
-    for (int col = 0; TL_BY_SPANS(sink) && sink_has_depth(sink) && col < n_cols; col += TL_LANES)
+    for (int col = 0; sink_has_depth(sink) && col < n_cols; col += TL_LANES)
         vd_store(z_cols + col, depths_of_columns(g, r, k, col, unit));
     for (int row0 = 0; row0 < n_rows; row0 += TL_LANES) {
         const int64_t at = (uint32_t)sample + row0 * target->stride_px;
@@ -318,13 +294,8 @@ TL_INLINE void draw_rows(walk_state *s, tl_geometry g, const tl_target *target, 
             const vd from = g == TL_FIXED ? y : vd_sub(y, vd_set1(r->y0[k]));
             vd_store(z_row, vd_add(vd_set1(r->z0[k]), vd_mul(vd_set1(r->slope_y[k]), from)));
         }
-        if (TL_BY_SPANS(sink)) {
-            const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
-            draw_spans(target, sink, vi_max(first, zero), vi_min(end, vi_set1(n_cols)), n, z_row, at, z_cols, id);
-        } else {
-            draw_blocks(g, target, sink, r, k, first, vi_select(vm_first(n_rows - row0), end, zero), n_cols, z_row, at,
-                        unit, id);
-        }
+        const int n = n_rows - row0 < TL_LANES ? n_rows - row0 : TL_LANES;
+        draw_spans(target, sink, vi_max(first, zero), vi_min(end, vi_set1(n_cols)), n, z_row, at, z_cols, id);
     }
 }
 
