@@ -269,9 +269,8 @@ typedef struct {
     /* out, or NULL: triangles that reach into `picture` beyond the window; end - first + 16 numbers */
     int32_t *outside;
     int64_t n_outside;
-    const tl_window *picture;       /* the whole of all passes; read if `outside` is not NULL */
-    int is_first, is_last;          /* among the passes over the window: the first clears it */
-    struct tl_exact_counts *counts; /* out, or NULL: counts are added, for a mesh without snapped vertices */
+    const tl_window *picture; /* the whole of all passes; read if `outside` is not NULL */
+    int is_first, is_last;    /* among the passes over the window: the first clears it */
 } tl_slice;
 
 /* The triangles that reach into a window, and the first and last band of rows of each. */

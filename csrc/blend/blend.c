@@ -69,11 +69,10 @@ static __attribute__((noinline)) void refine_blend_rows(walk_state *s, int i, la
         set_refined(s, q, i, k, t, TL_FAR_BAND, &a);
         for (int row = 0; row < n; row++) {
             int64_t first, end;
-            decide_row(&a, row, &first, &end, s->counts);
+            decide_row(&a, row, &first, &end);
             rows->first[row][k] = sample[k] + row * stride + (int32_t)first;
             rows->n[row][k] = (int32_t)(end - first);
         }
-        s->counts->n_refined += n;
     }
 }
 
@@ -225,8 +224,7 @@ static void blend_fixed(blend_pass *p)
 static __attribute__((noinline)) void blend_float(blend_pass *p)
 {
     const tl_snapped drawn = drawn_mesh(p->mix.snapped);
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
-    start_float(&p->walk, &drawn, p->mix.window, &p->mix.target, &counts);
+    start_float(&p->walk, &drawn, p->mix.window, &p->mix.target);
     if (drawn.mesh.exact->pieces || p->walk.is_far)
         blend_each_float(p);
     else

@@ -41,10 +41,9 @@ static fan_area area_in_fan(const tl_pieces *p, int64_t first, int n, int apex, 
     const int64_t corners[3] = {first + apex, first + (apex + i) % n, first + (apex + i + 1) % n};
     fan_area area = {.size_fx = i128_from(0)};
     if (p->points) {
-        tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
         const exact_point a = piece_point(p, corners[0]), b = piece_point(p, corners[1]);
         const exact_point c = piece_point(p, corners[2]);
-        area.sign = edge_sign(a, b, c, &counts);
+        area.sign = edge_sign(a, b, c);
         area.size = fabs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
     } else {
         const tl_wide a = snapped_corner(p, corners[0]), b = snapped_corner(p, corners[1]);

@@ -225,7 +225,7 @@ TL_INLINE int are_in_range(exact_point a, exact_point b, exact_point p)
 
 /* ---- signs ----------------------------------------------------------------------------------------------- */
 
-static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
+static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exact_point p)
 {
     double dx, dy, px, py, dx_error, dy_error, px_error, py_error;
     two_difference(b.x, a.x, &dx, &dx_error);
@@ -247,11 +247,9 @@ static __attribute__((noinline)) int slow_sign(exact_point a, exact_point b, exa
     if (are_in_range(a, b, p)) {
         double sum[TL_EXPANSION];
         const int n = expand_edge(a, b, p, sum);
-        counts->n_expansions++;
         return n ? (sum[n - 1] > 0.0) - (sum[n - 1] < 0.0) : 0;
     }
     big_product size_of_edge;
-    counts->n_integers++;
     return big_edge(a, b, p, &size_of_edge);
 }
 
@@ -264,13 +262,13 @@ TL_INLINE double rounded_edge(exact_point a, exact_point b, exact_point p, doubl
     return left - right;
 }
 
-TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p, tl_exact_counts *counts)
+TL_INLINE int edge_sign(exact_point a, exact_point b, exact_point p)
 {
     double bound;
     const double e = rounded_edge(a, b, p, &bound);
     if (fabs(e) > bound)
         return e > 0.0 ? 1 : -1;
-    return slow_sign(a, b, p, counts);
+    return slow_sign(a, b, p);
 }
 
 /* The point at which an edge is tested: the sample; or for the square with its upper left corner there, the corner
@@ -286,19 +284,19 @@ TL_INLINE exact_point tested_point(exact_point a, exact_point b, exact_point p, 
 /* Whether a point lies on the inner side of an edge of a triangle with positive area, or on the edge if it is a top or
  * left edge.  Two triangles that share the edge decide by one number with opposite signs, and exactly one of them owns
  * a tie: no gaps, no overlap.  For squares a tie is inside for INNER alone. */
-TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test, tl_exact_counts *counts)
+TL_INLINE int is_inside_edge(exact_point a, exact_point b, exact_point p, tl_test test)
 {
-    const int sign = edge_sign(a, b, tested_point(a, b, p, test), counts);
+    const int sign = edge_sign(a, b, tested_point(a, b, p, test));
     if (sign || test != TL_TEST_SAMPLE)
         return sign > 0 || (sign == 0 && test == TL_TEST_INNER);
     return b.y < a.y || (b.y == a.y && b.x > a.x);
 }
 
-static int is_inside(const exact_point *corners, exact_point p, tl_test test, tl_exact_counts *counts)
+static int is_inside(const exact_point *corners, exact_point p, tl_test test)
 {
-    return is_inside_edge(corners[0], corners[1], p, test, counts) &&
-           is_inside_edge(corners[1], corners[2], p, test, counts) &&
-           is_inside_edge(corners[2], corners[0], p, test, counts);
+    return is_inside_edge(corners[0], corners[1], p, test) &&
+           is_inside_edge(corners[1], corners[2], p, test) &&
+           is_inside_edge(corners[2], corners[0], p, test);
 }
 
 /* E to within 2^-50 of its size. */

@@ -80,8 +80,7 @@ static int compare_points(const resolve_state *s, int64_t x_px, int64_t y_px, in
     const exact_point *p = s->points, sample = sample_of(s->exact, x_px, y_px, bits);
     const edge_term terms[3] = {
         {p[2], p[0], sample, 2 * d1}, {p[0], p[1], sample, 2 * d2}, {p[0], p[1], p[2], -halves}};
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
-    return terms_sign(terms, 3) * edge_sign(p[0], p[1], p[2], &counts);
+    return terms_sign(terms, 3) * edge_sign(p[0], p[1], p[2]);
 }
 
 /* The exact value of a channel rounded to nearest, ties to even; `value`, which errs by less than 2^-20, suffices

@@ -496,9 +496,8 @@ static void normalize_edges(special_run *e, const tl_vertex_set *set, const int3
         e->area = area < 0.0 ? -1.0f : 1.0f;
         return;
     }
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
     const int sign = -edge_sign(point_of(set->exact, corners[0]), point_of(set->exact, corners[1]),
-                                point_of(set->exact, corners[2]), &counts);
+                                point_of(set->exact, corners[2]));
     for (int k = 0; k < 3; k++)
         e->at[k] = sign / 3.0, e->step[k] = 0.0, row_step[k] = 0.0f;
     e->area = (float)sign;

@@ -38,10 +38,9 @@ static int has_float_weights(const exact_point *p, double *area)
 /* Whether a sample lies in a triangle of either winding. */
 static int holds(const exact_point *p, exact_point sample)
 {
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
-    const int sign = edge_sign(p[0], p[1], p[2], &counts);
+    const int sign = edge_sign(p[0], p[1], p[2]);
     const exact_point turned[3] = {p[0], p[sign < 0 ? 2 : 1], p[sign < 0 ? 1 : 2]};
-    return sign && is_inside(turned, sample, TL_TEST_SAMPLE, &counts);
+    return sign && is_inside(turned, sample, TL_TEST_SAMPLE);
 }
 
 /* The piece of a triangle that holds a sample, or -1; sets its corners. */

@@ -177,7 +177,7 @@ typedef struct {
 
 /* Decides samples in doubt, TL_LANES at a time by float64, then by the exact sign; sets bit `lane` of found[place] for
  * those inside. */
-TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, unsigned *found, tl_exact_counts *counts)
+TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, unsigned *found)
 {
     picked_points m;
     store_points_to_pick(t, &m);
@@ -198,7 +198,7 @@ TL_INLINE void decide_samples(const lane_exact *t, const doubted_samples *d, uns
             const int j = __builtin_ctz(left), k = d->codes[i + j] & 0xff, at = d->codes[i + j] >> 8;
             const exact_point p[3] = {{m.x[0][k], m.y[0][k]}, {m.x[1][k], m.y[1][k]}, {m.x[2][k], m.y[2][k]}};
             const exact_point sample = {m.sample_x[k] + (at & (TL_SMALL_BOX - 1)), m.sample_y[k] + (at >> 2)};
-            if (inside >> j & 1 || is_inside(p, sample, t->test, counts))
+            if (inside >> j & 1 || is_inside(p, sample, t->test))
                 found[at] |= 1u << k;
         }
     }
@@ -229,11 +229,10 @@ static __attribute__((noinline)) void refine_boxes(walk_state *s, lane_exact *t,
         for (int k = 0; k < 3; k++)
             t->e[k] = vf_add(t->e[k], t->dx[k]);
     }
-    s->counts->n_refined += d.n;
     if (!d.n)
         return;
     vi_store(d.codes + d.n, vi_set1(0));
-    decide_samples(t, &d, found, s->counts);
+    decide_samples(t, &d, found);
     for (int row = 0; row < size; row++)
         for (int col = 0; col < size; col++)
             in[row][col] = vm_or(in[row][col], vm_from_bits(found[row * TL_SMALL_BOX + col]));

@@ -367,12 +367,12 @@ static __attribute__((noinline)) void draw_listed_pieces(walk_state *s, int64_t 
 
 /* Draws every triangle of a slice without snapped vertices; triangles from n_whole on are pieces. */
 TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                           tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row, tl_sink sink)
+                           tl_slice *slice, int64_t *bad_row, tl_sink sink)
 {
     const int counts_pieces = target->sink == TL_SINK_COUNT && window->test != TL_TEST_SAMPLE;
     walk_state s;
     tl_slice part = *slice;
-    start_float(&s, mesh, window, target, counts);
+    start_float(&s, mesh, window, target);
     set_slice(&s, slice);
     part.end = counts_pieces ? min64(slice->end, n_whole) : slice->end;
     draw_triangles(&s, TL_FLOAT, sink, &part);
@@ -387,8 +387,8 @@ TL_INLINE void draw_floats(const tl_snapped *mesh, int64_t n_whole, const tl_win
 
 TL_LIST_COPIES(draw_floats,
                (const tl_snapped *mesh, int64_t n_whole, const tl_window *window, const tl_target *target,
-                tl_slice *slice, tl_exact_counts *counts, int64_t *bad_row),
-               mesh, n_whole, window, target, slice, counts, bad_row)
+                tl_slice *slice, int64_t *bad_row),
+               mesh, n_whole, window, target, slice, bad_row)
 
 /* The mesh with the triangles that are drawn: clipped triangles collapsed, then all pieces. */
 static tl_snapped drawn_mesh(const tl_snapped *snapped)
@@ -405,13 +405,11 @@ static int64_t draw_exact(const tl_snapped *snapped, const tl_window *band, cons
 {
     const tl_snapped drawn = drawn_mesh(snapped);
     const int has_all = !slice->ids && slice->end == snapped->n_triangles;
-    tl_exact_counts unused = {0, 0, 0, 0, 0, 0};
-    tl_exact_counts *const counts = slice->counts ? slice->counts : &unused;
     tl_slice own = *slice;
     int64_t bad_row = -1;
     own.end = has_all ? drawn.n_triangles : slice->end;
     if (own.first < own.end)
-        TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, counts, &bad_row)
+        TL_LIST_CALL(draw_floats, part->sink, &drawn, snapped->n_triangles, band, part, &own, &bad_row)
     slice->n_outside = own.n_outside;
     return bad_row;
 }

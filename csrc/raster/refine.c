@@ -46,21 +46,21 @@ TL_INLINE void set_bands(const walk_state *s, const lane_exact *t, float far, vf
 }
 
 /* Whether column k of a row lies inside edge i. */
-TL_INLINE int is_column_inside(const refined_triangle *a, int i, double y, int64_t k, tl_exact_counts *counts)
+TL_INLINE int is_column_inside(const refined_triangle *a, int i, double y, int64_t k)
 {
     const exact_point sample = {a->sample_x + (double)k, y};
-    return is_inside_edge(a->corners[i], a->corners[i == 2 ? 0 : i + 1], sample, a->test, counts);
+    return is_inside_edge(a->corners[i], a->corners[i == 2 ? 0 : i + 1], sample, a->test);
 }
 
 /* The columns of [*first, *end) inside edge i, by bisection. */
 static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int i, double y, int64_t *first,
-                                                 int64_t *end, tl_exact_counts *counts)
+                                                 int64_t *end)
 {
     const int is_left = a->dy[i] < 0.0;
     int64_t low = *first, high = *end; /* the first column that is inside a left edge, or outside a right edge */
     while (low < high) {
         const int64_t middle = low + (high - low) / 2;
-        if (is_column_inside(a, i, y, middle, counts) == is_left)
+        if (is_column_inside(a, i, y, middle) == is_left)
             high = middle;
         else
             low = middle + 1;
@@ -69,7 +69,7 @@ static __attribute__((noinline)) void bisect_row(const refined_triangle *a, int 
 }
 
 /* Sets the columns [*first, *end) of a row with an end in doubt. */
-TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first, int64_t *end, tl_exact_counts *counts)
+TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first, int64_t *end)
 {
     const double y = a->sample_y + (double)row;
     *first = 0, *end = a->n_cols;
@@ -78,7 +78,7 @@ TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first
             continue;
         const double size = fabs(a->dy[i]), v = a->v[i] + a->dx[i] * (double)row, q = v / size;
         if (!(a->band[i] < 0.49) && !(fabs(q) > a->n_cols + 2.0 * a->band[i])) {
-            bisect_row(a, i, y, first, end, counts);
+            bisect_row(a, i, y, first, end);
             continue;
         }
         const double far = a->n_cols + 2.0, near = q > far ? far : q < -far ? -far : q;
@@ -87,7 +87,7 @@ TL_INLINE void decide_row(const refined_triangle *a, int64_t row, int64_t *first
         if (fabs(off) <= a->band[i]) {
             const int64_t k = a->dy[i] < 0.0 ? -(int64_t)nearest : (int64_t)nearest;
             if (k >= 0 && k < a->n_cols)
-                floor_q = (int64_t)nearest - !is_column_inside(a, i, y, k, counts);
+                floor_q = (int64_t)nearest - !is_column_inside(a, i, y, k);
         }
         if (a->dy[i] < 0.0)
             *first = -floor_q > *first ? -floor_q : *first;
@@ -140,7 +140,7 @@ typedef struct {
 /* Decides the columns in doubt of edge k, TL_LANES at a time by float64, then by the exact sign; clears the bits of
  * columns outside. */
 TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubted_columns *d,
-                              int32_t (*bits)[TL_MAX_LANES], tl_exact_counts *counts)
+                              int32_t (*bits)[TL_MAX_LANES])
 {
     const int next = k == 2 ? 0 : k + 1;
     vi_store(d->codes + d->n, vi_set1(0));
@@ -158,7 +158,7 @@ TL_INLINE void decide_columns(const picked_points *m, int k, tl_test test, doubt
             const int lane_j = code_j & 0xff, row_j = code_j >> 8 & 0xff, col_j = code_j >> 16;
             const exact_point a = {m->x[k][lane_j], m->y[k][lane_j]}, b = {m->x[next][lane_j], m->y[next][lane_j]};
             const exact_point sample = {m->sample_x[lane_j] + col_j, m->sample_y[lane_j] + row_j};
-            if (outside >> j & 1 || !is_inside_edge(a, b, sample, test, counts))
+            if (outside >> j & 1 || !is_inside_edge(a, b, sample, test))
                 bits[row_j][lane_j] &= ~(1 << col_j);
         }
     }
@@ -217,10 +217,8 @@ static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const bo
         any |= wide_rows[row];
     }
     store_points_to_pick(t, &m);
-    for (int k = 0; k < 3; k++) {
-        s->counts->n_refined += d[k].n;
-        decide_columns(&m, k, t->test, &d[k], bits, s->counts);
-    }
+    for (int k = 0; k < 3; k++)
+        decide_columns(&m, k, t->test, &d[k], bits);
     for (; any; any &= any - 1) {
         const int k = __builtin_ctz(any), n = q->size[i + k] >> 16;
         refined_triangle a;
@@ -229,17 +227,15 @@ static __attribute__((noinline)) void refine_middle_rows(walk_state *s, const bo
             int64_t first, end;
             if (!(wide_rows[row] >> k & 1))
                 continue;
-            decide_row(&a, row, &first, &end, s->counts);
+            decide_row(&a, row, &first, &end);
             bits[row][k] = first < end ? (int32_t)((1u << end) - (1u << first)) : 0;
-            s->counts->n_refined++;
         }
     }
 }
 
 /* Decides TL_LANES rows of a triangle from row0 on: by float64, and where float64 is in doubt, row by row by the exact
  * sign. */
-TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned doubted, row_ends *ends,
-                               tl_exact_counts *counts)
+TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned doubted, row_ends *ends)
 {
     const vi zero = vi_set1(0), n_cols = vi_set1(a->n_cols);
     const vf rows = vf_from_vi(vi_add(vi_iota(), vi_set1(row0)));
@@ -264,11 +260,10 @@ TL_INLINE void decide_row_ends(const refined_triangle *a, int row0, unsigned dou
             end = vi_min(end, vi_add(floors, vi_set1(1)));
     }
     vi_store(ends->first, begin), vi_store(ends->end, end);
-    counts->n_refined += __builtin_popcount(doubted);
     for (unsigned left = vm_bits(unsure) & doubted; left; left &= left - 1) {
         const int row = __builtin_ctz(left);
         int64_t first, stop;
-        decide_row(a, row0 + row, &first, &stop, counts);
+        decide_row(a, row0 + row, &first, &stop);
         ends->first[row] = (int32_t)first, ends->end[row] = (int32_t)stop;
     }
 }
@@ -279,7 +274,8 @@ static __attribute__((noinline)) void refine_row_ends(walk_state *s, int i, int 
 {
     refined_triangle a;
     set_refined(s, &s->rows, i, k, t, TL_FAR_BAND, &a);
-    decide_row_ends(&a, row0, doubted, ends, s->counts);
+    decide_row_ends(&a, row0, doubted, ends);
+    s->has_refined = 1;
 }
 
 #endif

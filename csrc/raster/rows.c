@@ -338,9 +338,9 @@ TL_INLINE void flush_rows(walk_state *s, tl_geometry g, tl_sink sink)
             TL_SINK_CALL(draw_rows_fixed, s->target->sink, s, &r, i, lanes_at(i, n))
             continue;
         }
-        const int64_t n_refined = s->counts->n_refined;
+        s->has_refined = 0;
         TL_SINK_CALL(draw_rows_float, s->target->sink, s, &r, &t, i, lanes.live)
-        if (s->counts->n_refined != n_refined)
+        if (s->has_refined)
             try_grid(s, &t, 0);
     }
 }

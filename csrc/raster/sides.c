@@ -16,14 +16,13 @@
 /* The sign of the area of a triangle of points `stride` numbers apart; without points, of vertex records. */
 static int turn_of(const double *points, int stride, const tl_vertex_set *set, const int32_t *corners)
 {
-    tl_exact_counts counts = {0, 0, 0, 0, 0, 0};
     tl_triangle t;
     exact_point p[3];
     if (!points)
         return load_triangle(set, corners, &t);
     for (int k = 0; k < 3; k++)
         p[k] = (exact_point){points[(int64_t)corners[k] * stride], points[(int64_t)corners[k] * stride + 1]};
-    return edge_sign(p[0], p[1], p[2], &counts);
+    return edge_sign(p[0], p[1], p[2]);
 }
 static int wanted_turn(const tl_snapped *snapped) { return snapped->cull == TL_CULL_BACK ? -1 : 1; }
 

@@ -302,7 +302,7 @@ static int setup_single_float(walk_state *s, int32_t i, single_triangle *t, tl_t
     t->n_rows = find_single_box(y0, y1, test, s->centre_y, w->y_px, w->y_px + w->height, &t->row);
     if (e->n_cols <= 0 || t->n_rows <= 0)
         return 0;
-    const int sign = edge_sign(p[0], p[1], p[2], s->counts), second = sign < 0 ? 2 : 1;
+    const int sign = edge_sign(p[0], p[1], p[2]), second = sign < 0 ? 2 : 1;
     if (is_culled(sign, s->snapped->cull))
         return 0;
     if (sign < 0) {
@@ -320,19 +320,17 @@ static int setup_single_float(walk_state *s, int32_t i, single_triangle *t, tl_t
             t->z[k] = s->points->stride < 3 ? 0.0 : s->points->points[(int64_t)ordered[k] * s->points->stride + 2];
         plane_of_points(t, x1 - x0, y1 - y0);
     }
-    s->counts->n_triangles++;
     return 1;
 }
 
 /* Decides the ends of the rows in doubt, by the exact sign. */
 static __attribute__((noinline)) void refine_single_ends(const refined_triangle *a, int64_t row0, unsigned doubted,
-                                                         int32_t *first, int32_t *end, tl_exact_counts *counts)
+                                                         int32_t *first, int32_t *end)
 {
-    counts->n_refined += __builtin_popcount(doubted);
     for (; doubted; doubted &= doubted - 1) {
         const int k = __builtin_ctz(doubted);
         int64_t from, to;
-        decide_row(a, row0 + k, &from, &to, counts);
+        decide_row(a, row0 + k, &from, &to);
         first[k] = (int32_t)from, end[k] = (int32_t)to;
     }
 }
@@ -358,7 +356,7 @@ TL_INLINE void draw_single_float(walk_state *s, int32_t i, tl_sink sink)
         const unsigned doubted = takes_steps ? take_step(&steps, t.edges.n_cols, first, end)
                                              : find_single_ends(&t, row0, first, end) & ((1u << n) - 1);
         if (__builtin_expect(doubted != 0, 0))
-            refine_single_ends(&found.edges, row0, doubted, first, end, s->counts);
+            refine_single_ends(&found.edges, row0, doubted, first, end);
         for (int k = 0; k < n; k++) {
             const int64_t at = corner + (row0 + k) * stride;
             if (first[k] >= end[k])
@@ -395,7 +393,7 @@ static void count_squares_of_pieces(walk_state *s, int64_t first, int64_t end)
             if (row < t[i].row || row >= t[i].row + t[i].n_rows)
                 continue;
             if (find_single_end(&t[i], row - t[i].row, &from, &to))
-                refine_single_ends(&t[i].edges, row - t[i].row, 1, &from, &to, s->counts);
+                refine_single_ends(&t[i].edges, row - t[i].row, 1, &from, &to);
             const int64_t col = t[i].col - left;
             spans[n_spans++] = (row_span){col + from, col + to};
         }

@@ -58,9 +58,9 @@ typedef struct {
     int64_t bad_row; /* of triangles, -1: none so far */
     /* TL_FLOAT */
     const tl_exact_points *points;
-    tl_exact_counts *counts;
     double centre_x, centre_y; /* the sample of a pixel from its upper left corner; 0 for squares */
     int is_far;                /* int32 cannot count the pixels of the window: all triangles are drawn singly */
+    int has_refined;           /* a row end was in doubt since this was 0 */
     int has_places;            /* vertices have places, and all of the window lies within their limit */
     int may_be_on_grid;        /* triangles in doubt were on the grid: so many more vectors test it first */
     int n_slivers;             /* queued triangles without a depth plane, to be drawn singly */

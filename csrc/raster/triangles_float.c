@@ -108,10 +108,9 @@ static __attribute__((noinline)) void refine_turns(const walk_state *s, vi all_i
         const int k = __builtin_ctz(doubted);
         exact_point p[3];
         load_turned(s, ids[k], 0, p);
-        const int sign = edge_sign(p[0], p[1], p[2], s->counts);
+        const int sign = edge_sign(p[0], p[1], p[2]);
         *negative = (*negative & ~(1u << k)) | (unsigned)(sign < 0) << k;
         *flat |= (unsigned)(sign == 0) << k;
-        s->counts->n_turns++;
     }
 }
 
@@ -494,7 +493,6 @@ TL_INLINE void pop_float(const walk_state *s, tl_sink sink, const box_queue *q, 
 TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_boxes)
 {
     const vm good = s->may_be_on_grid ? find_on_grid(s, t, of_boxes) : vm_first(0);
-    s->counts->n_triangles += __builtin_popcount(vm_bits(t->live));
     if (of_boxes) {
         set_box_edges(s, t, good);
     } else {
@@ -515,7 +513,6 @@ TL_INLINE void setup_float(walk_state *s, tl_sink sink, lane_exact *t, int of_bo
         else if (vm_any(good))
             set_grid_edges(t, good);
         s->may_be_on_grid = vm_any(good) ? s->may_be_on_grid - 1 : 0;
-        s->counts->n_on_grid += __builtin_popcount(vm_bits(vm_and(t->on_grid, t->live)));
     }
 }
 
@@ -561,14 +558,13 @@ TL_INLINE int is_near_0(const tl_window *window)
 }
 
 /* The window lies within 2^48 pixels of 0, where centres and samples are exact in float64. */
-static void start_float(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target,
-                        tl_exact_counts *counts)
+static void start_float(walk_state *s, const tl_snapped *snapped, const tl_window *window, const tl_target *target)
 {
     const int64_t limit = TL_PLACE_LIMIT_PX - TL_MAX_BOX_PX - 2;
     const double unit = 1.0 / (double)(1 << window->subpixel_bits);
     const int of_squares = window->test != TL_TEST_SAMPLE;
     start_walk(s, snapped, window, target);
-    s->points = snapped->mesh.exact, s->counts = counts;
+    s->points = snapped->mesh.exact;
     s->centre_x = of_squares ? 0.0 : 0.5 + snapped->mesh.sample_x_fx * unit;
     s->centre_y = of_squares ? 0.0 : 0.5 + snapped->mesh.sample_y_fx * unit;
     s->is_far = !is_near_0(window), s->may_be_on_grid = 0;

@@ -9,16 +9,6 @@
 #define TL_PLACE_BITS 18
 #define TL_PLACE_LIMIT_PX 4096
 
-/* How many decisions were made by each method. */
-typedef struct tl_exact_counts {
-    int64_t n_triangles;  /* drawn triangles, counted in each pass */
-    int64_t n_on_grid;    /* with all vertices on 2^-8 px, tested because their vector was in doubt */
-    int64_t n_refined;    /* samples and row ends too near an edge for float lanes */
-    int64_t n_turns;      /* triangles: the sign of the area was refined */
-    int64_t n_expansions; /* signs that only sums of many numbers decided */
-    int64_t n_integers;   /* signs that only integers of 2176 bits decided */
-} tl_exact_counts;
-
 /* A mesh with these float64 vertices.  A vertex that cannot be drawn has x NaN.  `triangles` are those of the mesh,
  * collapsed to a point where a clip plane cuts them, and then all pieces. */
 typedef struct tl_exact_points {

@@ -73,10 +73,3 @@ def test_edges_of_single_sided_triangles_in_a_mirror_are_those_of_the_front():
     single = tl.Mesh(BALL.vertices, BALL.triangles, materials=[tl.Material(double_sided=False)])
     plain, over = (tl.render(single, one, SIZE, edges=True)[..., 3] for one in (camera(), camera(fx=-45.0)))
     assert np.abs(plain[:, ::-1].astype(int) - over).max() <= 1  # of 255: lines are anti-aliased
-
-
-def test_plan_of_a_mirrored_camera_draws_its_picture():
-    over = camera(fx=-45.0)
-    plan = tl.plan(BALL, over, SIZE, cull="back")
-    planned = tl.rasterize_mesh(BALL, over, SIZE, cull="back", plan=plan)
-    assert np.array_equal(planned.triangle, tl.rasterize_mesh(BALL, over, SIZE, cull="back").triangle)

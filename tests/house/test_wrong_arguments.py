@@ -38,7 +38,7 @@ TRANSFORMS = {"fl_x": 9.0, "frames": [{"transform_matrix": np.eye(4).tolist()}]}
 PYTORCH3D = {"R": np.eye(3)[None], "T": np.zeros((1, 3)), "focal_length": 2.0, "principal_point": np.zeros((1, 2))}
 VIEW = {
     "transform": None, "origin": (0, 0), "viewport": None, "subpixel_bits": 8, "sampling": "center", "method": "auto",
-    "cull": "none", "clip_depth": "minus_one_to_one", "threads": None, "plan": None,
+    "cull": "none", "clip_depth": "minus_one_to_one", "threads": None,
 }  # fmt: skip
 LOOK = {
     "lights": None, "ambient": None, "material": None, "matcap": None, "fog": None, "shading": "smooth",

@@ -203,9 +203,6 @@ def test_plan_of_a_mesh_tells_its_level():
     )
     assert found.n_triangles == len(level.mesh.triangles)
     assert "not: the mesh itself" in found.explain()
-    matrix = FAR.clip_from_world(SIZE)
-    frags = tl.rasterize(level.mesh.vertices, level.mesh.triangles, SIZE, transform=matrix, plan=found)
-    assert np.array_equal(frags.triangle, tl.rasterize_mesh(BLOB, FAR, SIZE, tolerance=0.5).triangle)
 
 
 def test_plan_of_a_mesh_without_tolerance_is_of_the_mesh():

@@ -105,15 +105,6 @@ def test_batch_of_samples_is_each_of_them(threads):
     assert tl.rasterize_poses(CLIP[:0], MESH.triangles, SIZE, **options).samples_triangle.shape == (0, 18, 24, 1)
 
 
-@pytest.mark.parametrize("sampling", ["center", "msaa2"])
-def test_batch_with_a_plan_is_that_without(sampling):
-    plan = tl.plan(CLIP[0], MESH.triangles, SIZE, sampling=sampling)
-    found = tl.rasterize_poses(CLIP, MESH.triangles, SIZE, sampling=sampling, plan=plan)
-    assert_same(found, [tl.rasterize(clip, MESH.triangles, SIZE, sampling=sampling) for clip in CLIP])
-    with pytest.raises(ValueError, match="plan is for other triangles"):
-        tl.rasterize_poses(CLIP, MESH.triangles[::-1], SIZE, sampling=sampling, plan=plan)
-
-
 def test_batch_has_derivatives_and_textures():
     found = tl.rasterize_poses(CLIP, MESH.triangles, SIZE)
     alone = [tl.rasterize(clip, MESH.triangles, SIZE) for clip in CLIP]

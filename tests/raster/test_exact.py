@@ -373,25 +373,6 @@ def test_error_leaves_no_trace_in_out():
     assert (out == 7).all()
 
 
-def test_plan_is_for_one_precision():
-    with pytest.raises(ValueError, match="plan is for subpixel_bits=8, got 'exact'"):
-        tl.rasterize(*TRIANGLE, plan=tl.plan(*TRIANGLE), **EXACT)
-    with pytest.raises(ValueError, match="plan is for subpixel_bits='exact', got 8"):
-        tl.rasterize(*TRIANGLE, plan=tl.plan(*TRIANGLE, **EXACT))
-
-
-def test_plan_tells_what_was_in_doubt():
-    scene = mixed_scene(np.random.default_rng(3), 400)
-    plan = tl.plan(*scene.arrays, **EXACT)
-    (stage,) = (stage for stage in plan.stages if stage.name == "arithmetic")
-    assert "in doubt" in stage.choice
-    has_vectors = tl.build_info()["isa"] != "scalar"
-    assert ("on 2**-8 px, without rounding" in stage.choice) == has_vectors
-    frags = tl.rasterize(*scene.arrays, plan=plan, **EXACT)
-    comparing.assert_same(frags.triangle, tl.rasterize(*scene.arrays, **EXACT).triangle)
-    assert {"input", "vertices", "draw"} <= plan.measured_ms.keys()
-
-
 def test_depth_that_float32_cannot_hold_is_named():
     with pytest.raises(ValueError, match="vertices must have a depth that float32 can hold"):
         tl.rasterize([[0, 0, 0], [4, 0, 1e39], [0, 4, 0]], *TRIANGLE[1:], **EXACT)

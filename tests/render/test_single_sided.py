@@ -208,9 +208,3 @@ def test_single_sided_threads_windows_and_clusters_change_nothing(camera):
         assert_same(frags.triangle, one.triangle)
         part = tl.rasterize_mesh(again, camera, (50, 40), origin=(33, 21), viewport=SIZE)
         assert_same(part.triangle, one.triangle[21:61, 33:83])
-
-
-def test_a_plan_draws_what_is_drawn_without():
-    plan = tl.plan(MIXED, FRAMED, SIZE)
-    got = tl.rasterize_mesh(MIXED, FRAMED, SIZE, plan=plan)
-    assert_same(got.triangle, tl.rasterize_mesh(MIXED, FRAMED, SIZE).triangle)

@@ -102,13 +102,13 @@ def out_of(changing: Changing, shape: Sequence[int], dtypes: str) -> np.ndarray 
 
 
 def verb(changing: Changing) -> Case:
-    """`coverage`, `overdraw`, `fill`, `rasterize` or `wireframe`, also of a `Rasterizer` and after a plan."""
+    """`coverage`, `overdraw`, `fill`, `rasterize` or `wireframe`, also of a `Rasterizer`."""
     draw, size = changing.draw, size_of(changing.draw)
     name = draw.of(["rasterize", "fill", "coverage", "overdraw", "wireframe"])
     areas = {"coverage": ["area", "outer", "inner"], "overdraw": ["area", "outer", "inner"], "fill": ["area"] * 2}
     view = options_of(draw, ["center"] if name == "wireframe" else [*SAMPLINGS, *areas.get(name, [])], METHODS)
     arrays = [*scene_of(changing, size, view)]
-    asked, shape = {"outputs": {"fill": "color", "rasterize": "triangle"}.get(name, name), **view}, size[::-1]
+    shape = size[::-1]
     if name == "fill":
         view["per"] = draw.of(["triangle", "vertex"])
         n = len(arrays[view["per"] == "triangle"])
@@ -125,12 +125,10 @@ def verb(changing: Changing) -> Case:
     if name == "wireframe":
         view["antialias"] = draw.chance(2)
         view["depth"] = changing.numbers("depth", shape, 0, 1) if draw.chance(2) else None
-    more = draw.of(["once", "once", "once", "plan", "Rasterizer"]) if name != "wireframe" else "once"
+    more = draw.of(["once", "once", "once", "once", "Rasterizer"]) if name != "wireframe" else "once"
 
     def call() -> None:
         options = dict(view)
-        if more == "plan":
-            options["plan"] = tl.plan(arrays[0], arrays[1], size, **asked)
         if more == "Rasterizer":
             draws = getattr(tl.Rasterizer(size), name)
             attempts(lambda: draws(*arrays, **options), lambda: draws(*arrays, **options))

@@ -16,10 +16,9 @@ cdef tuple[Array, Array, Array] joined(Pieces pieces, points: Array, triangles: 
 
 
 cdef class UnsnappedPoints:
-    """Vertices in pixels, not snapped, and their triangles; counts how samples were decided."""
+    """Vertices in pixels, not snapped, and their triangles."""
 
     cdef tl_exact_points points
-    cdef tl_exact_counts counted
     cdef int64_t n_vertices
     cdef object arrays
 
@@ -29,7 +28,6 @@ cdef class UnsnappedPoints:
         cdef const double[:, ::1] points = points_given
         cdef const int32_t[:, ::1] triangles = triangles_given
         cdef const int32_t[::1] names = None
-        memset(&self.counted, 0, sizeof(self.counted))
         self.n_vertices = points.shape[0]
         if pieces is not None:
             points, triangles, names = joined(pieces, points_given, np.asarray(triangles_given))
@@ -41,18 +39,3 @@ cdef class UnsnappedPoints:
         self.points.names = &names[0] if names is not None and names.shape[0] else NULL
         self.points.pieces = &pieces.pieces if pieces is not None and len(pieces) else NULL
         self.points.band = band
-
-    @property
-    def counts(self) -> tuple[int, int, int, int, int, int]:
-        """The fields of `tl_exact_counts`, in order, summed over all draws."""
-        cdef tl_exact_counts *c = &self.counted
-        return c.n_triangles, c.n_on_grid, c.n_refined, c.n_turns, c.n_expansions, c.n_integers
-
-    cdef void add(self, const tl_exact_counts *counts):
-        cdef tl_exact_counts *c = &self.counted
-        c.n_triangles += counts.n_triangles
-        c.n_on_grid += counts.n_on_grid
-        c.n_refined += counts.n_refined
-        c.n_turns += counts.n_turns
-        c.n_expansions += counts.n_expansions
-        c.n_integers += counts.n_integers

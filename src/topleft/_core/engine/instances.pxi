@@ -118,7 +118,6 @@ cdef class PlacedMeshes:
     cdef void set_points(self, SnappedMesh mesh, const double *points, int64_t n):
         """Set n points (PLACED,) of a mesh that are not snapped, of triangles that no plane cuts."""
         cdef UnsnappedPoints exact = UnsnappedPoints.__new__(UnsnappedPoints)
-        memset(&exact.counted, 0, sizeof(exact.counted))
         memset(&exact.points, 0, sizeof(exact.points))
         exact.arrays, exact.n_vertices, exact.points.band = mesh.arrays, n, 1.0
         exact.points.points, exact.points.n_points, exact.points.stride = points, n, TL_PLACED

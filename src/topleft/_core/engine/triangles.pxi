@@ -115,10 +115,6 @@ cdef class SnappedMesh:
         other.viewport, other.is_used, other.exact = self.viewport, self.is_used, self.exact
         return other
 
-    cdef void note(self, const tl_exact_counts *counts):
-        if self.exact is not None:
-            self.exact.add(counts)
-
     cdef const tl_view *clip_view(self) noexcept nogil:
         """How clip space maps to pixels; NULL where vertices are in pixels."""
         return &self.viewport.view if self.viewport is not None else NULL
@@ -215,16 +211,12 @@ cdef class SnappedMesh:
     cdef int64_t draw_rows(self, Target target, int64_t first_row, int64_t n_rows, tl_slice *slice) except? -2:
         cdef tl_target rows = target.rows(first_row)
         cdef tl_window window = self.window(first_row, n_rows, target.width)
-        cdef tl_exact_counts counts
         cdef int64_t bad_row
-        memset(&counts, 0, sizeof(counts))
-        slice.counts = &counts
         if n_rows == target.height and (n_rows * target.width + 64) * self.snapped.n_triangles < HELD_DRAWN_PX:
             bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
         else:
             with nogil:
                 bad_row = K.draw_mesh(&self.snapped, &window, &rows, slice)
-        self.note(&counts)
         raise_if_given_up()
         return bad_row
 

@@ -195,7 +195,7 @@ def pays_float_lanes(view: View) -> bool:
 
     1,000,000 triangles of 1 px at 16 bits: 42 and 8 ms; 100,000 of 10 px at 12 bits: 12.7 and 4 ms.
     """
-    has_way = view.plan is None and view.transform is None and view.single_sided is None and view.classic is None
+    has_way = view.transform is None and view.single_sided is None and view.classic is None
     is_one = view.sampling in (Sampling.CENTER, Sampling.OUTER, Sampling.INNER)
     return view.subpixel_bits > 8 and is_one and has_way and takes_lanes(view) and not view.is_exact
 

@@ -17,7 +17,7 @@ from topleft._core.base.memory import FRESH, empty
 from topleft._core.base.threads import available_threads, run_parts
 from topleft._core.raster.fragments import Attributes, Fragments
 from topleft._core.raster.rasterize import draw_fragments, fragment_options
-from topleft._core.raster.view import Planned, View, ViewOptions
+from topleft._core.raster.view import View, ViewOptions
 from topleft.typing import DepthTestOption
 
 
@@ -112,17 +112,6 @@ class FragmentsBatch(Attributes, Sequence[Fragments]):
         return np.stack(found) if found else empty((*self.id.shape, *channels), np.float32)
 
 
-class PlanOfPoses(Planned):
-    """A plan that many poses use at once: it notes no times, and draws no clusters."""
-
-    def __init__(self, plan: Planned) -> None:
-        self._plan = plan
-
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the triangles of the plan, as `Planned` does."""
-        return self._plan.triangles_of(triangles, n_vertices)
-
-
 def rasterize_poses(
     vertices: ArrayLike,
     triangles: ArrayLike,
@@ -140,7 +129,7 @@ def rasterize_poses(
     vertices : array_like, shape (B, V, C) or (V, C)
         As in `rasterize`, of each pose or of all.
     triangles, size, depth_test, background_depth, **view
-        As in `rasterize`; `transform` may be (B, 4, 4). With a `plan` of one pose triangles are not checked again.
+        As in `rasterize`; `transform` may be (B, 4, 4).
     out : (ndarray of int32, ndarray of float32), each of shape (B, H, W), or (B, H, W, S) for S samples, optional
         Where ids and depth go; either may be None.
 
@@ -183,14 +172,12 @@ def rasterize_poses(
             outs.append(as_out(f"out {name}", array, shape, dtype))
         else:  # each pose has planes for its samples
             outs.append(empty(shape, dtype) if n_samples == 1 else None)
-    indices = triangles if checked.plan is not None else as_triangles(triangles)
-    if isinstance(indices, np.ndarray) and indices.dtype == np.int64 and checked.plan is None:  # once for all poses
+    indices = as_triangles(triangles)
+    if indices.dtype == np.int64:  # once for all poses
         indices = as_checked_triangles(indices, points.shape[-2] if points.ndim > 1 else 0)
     n_threads = min(n, available_threads() if checked.threads is None else checked.threads)
     if n_threads > 1:
         checked = replace(checked, threads=1)
-    if checked.plan is not None:
-        checked = replace(checked, plan=PlanOfPoses(checked.plan))
 
     def draw_pose(i: int) -> Fragments:
         ids, depth = (None if array is None else array[i] for array in outs)

@@ -101,11 +101,6 @@ def draw_sorted(own: SamplePass, targets: list[engine.Target], shape: tuple[int,
     return False
 
 
-def band_bytes(n_triangles: int) -> dict[str, int]:
-    """Return the most bytes of scratch that `draw_sorted` needs, by name."""
-    return {"bins": 12 * (n_triangles + 16), "bands": 4 * (n_triangles + 1)}
-
-
 def lay_background(ids: NDArray[np.int32], depth: NDArray[np.float32], sink: Sink, background: float) -> None:
     """Write the depth of the background where nothing is, unless the engine has cleared the buffer to it."""
     if background != (-np.inf if sink is Sink.FARTHEST else np.inf):

@@ -133,9 +133,7 @@ def read(memory: Memory, vertices: ArrayLike, triangles: ArrayLike, view: View, 
     """Return arrays as kernels take them, copied where they may share memory with `out`; int64 indices are checked."""
     points = as_vertices(apart_from(out, "vertices", vertices), has_transform=view.transform is not None)
     triangles = apart_from(out, "triangles", triangles)
-    if view.plan is not None:
-        is_checked, indices = True, view.plan.triangles_of(triangles, len(points))
-    elif view.static is not None:
+    if view.static is not None:
         is_checked, indices = True, view.static.drawn_triangles
     else:
         native = as_triangles(triangles)

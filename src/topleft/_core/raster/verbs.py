@@ -59,7 +59,6 @@ def coverage(
         * clip_depth : "minus_one_to_one" (OpenGL) or "zero_to_one" (Direct3D, Vulkan).
         * near_clip, far_clip : bool. Whether that plane clips.
         * threads : int or None. The result is the same to the bit.
-        * plan : Plan or None. Of `plan`, for the same triangles: saves their conversion and check, and notes the times.
 
     Returns
     -------

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, TypedDict, cast
 
@@ -27,19 +28,18 @@ MAX_EXACT_PX = 2**48
 CULL_CODES = {"none": 0, "back": 1, "front": 2}  # tl_cull in csrc/topleft.h
 
 
-class Planned(Protocol):
-    """The part of `topleft.Plan` that verbs use."""
+class Clock:
+    """The times of the stages of a call, which `Plan.measure` draws."""
 
-    def fitted(self, view: View) -> View:
-        """Return the view with its choices, or raise an error where the plan is for another view."""
-        return replace(view, plan=self)
+    def __init__(self) -> None:
+        self.ns: dict[str, int] = {}
+        self._last = time.perf_counter_ns()
 
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the checked int32 triangles, or raise an error where the plan is for others."""
-
-    def mark(self, stage: str) -> None:  # noqa: ARG002
-        """Note that a stage has ended: nothing, unless a plan measures."""
-        return
+    def mark(self, stage: str) -> None:
+        """End a stage."""
+        now = time.perf_counter_ns()
+        self.ns[stage] = self.ns.get(stage, 0) + now - self._last
+        self._last = now
 
 
 class Static(Protocol):
@@ -71,7 +71,6 @@ class WindowOptions(TypedDict, total=False):
     clip_depth: ClipDepthOption
     near_clip: bool
     far_clip: bool
-    plan: Any
 
 
 class ViewOptions(WindowOptions, total=False):
@@ -117,7 +116,7 @@ class View:
     far_clip: bool
     threads: int | None
     classic: Method | None = None
-    plan: Planned | None = None
+    clock: Clock | None = None
     static: Static | None = None
     """The mesh that has the arrays, if a mesh does."""
     single_sided: tuple[NDArray[np.uint8], int] | None = None
@@ -144,9 +143,9 @@ class View:
         return made
 
     def mark(self, stage: str) -> None:
-        """Note for the plan that a stage has ended."""
-        if self.plan is not None:
-            self.plan.mark(stage)
+        """Note for the clock that a stage has ended."""
+        if self.clock is not None:
+            self.clock.mark(stage)
 
     def refuse_classic(self, what: str) -> None:
         """Raise an error when a classic gets an option of the engine alone."""
@@ -180,9 +179,7 @@ class View:
         viewport = options.get("viewport")
         transform = options.get("transform")
         method = find_method(options.get("method", "auto"))
-        plan, cull = options.get("plan"), options.get("cull")
-        if not (plan is None or hasattr(plan, "fitted")):
-            raise TypeError(f"plan must be a Plan or None, got {type(plan).__name__}")
+        cull = options.get("cull")
         view = cls(
             size=size,
             origin=as_window(options.get("origin", (0, 0)), grid_bits),
@@ -204,7 +201,7 @@ class View:
         )
         if is_exact:
             check_exact(view, why_snapped)
-        return view if plan is None else plan.fitted(view)
+        return view
 
 
 @lru_cache(maxsize=256, typed=True)

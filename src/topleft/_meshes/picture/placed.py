@@ -204,7 +204,7 @@ class Placed:
         firsts = np.concatenate([[0], np.cumsum(self._vertex_counts[some])])
         n_threads = choices.threads_to_snap(view.threads, int(firsts[-1]), self.scene.n_triangles)
         is_sliced = n_threads <= n  # fewer instances than threads: each is the work of all of them
-        if not (is_sliced and view.plan is None and view.grid_bits == view.subpixel_bits) or 0 in view.size:
+        if not (is_sliced and view.grid_bits == view.subpixel_bits) or 0 in view.size:
             return None
         points = FRESH.empty("points", (int(firsts[-1]), engine.PLACED), np.float64) if view.is_exact else None
         shape = int(firsts[-1]) * engine.VERTEX_BYTES

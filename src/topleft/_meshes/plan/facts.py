@@ -1,25 +1,23 @@
 """Computes the facts that decide a draw: transforms, clips and snaps as the draw does, then counts instead of drawing.
 
-In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` describes in sentences; the bytes of a call.
+In: the arrays of a call, or a mesh. Out: `Facts`, which `stages.py` describes in sentences.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from topleft._core import engine
 from topleft._core.base.arrays import as_array
-from topleft._core.base.memory import FRESH, empty
+from topleft._core.base.memory import FRESH
 from topleft._core.base.options import Sampling, Sink
 from topleft._core.raster import choices
 from topleft._core.raster.choices import Drawing, FillRoute, Route
 from topleft._core.raster.cluster_draw import SURVEYED, SURVEYED_OF_SAMPLES, ClusteredMesh
 from topleft._core.raster.clusters import Clusters
-from topleft._core.raster.sampling import area_cells, band_bytes, sample_positions
+from topleft._core.raster.sampling import sample_positions
 from topleft._core.raster.snap import snap_mesh
 from topleft._core.raster.view import View
 from topleft._meshes.model.mesh import Mesh
@@ -45,17 +43,6 @@ class ClusterFacts:
     n_turned: int = 0  # away from the eye
     n_hidden: int = 0
     n_drawn: int = 0
-
-
-class Decided(NamedTuple):
-    """How samples of triangles that are not snapped were decided: `tl_exact_counts` in ``csrc/vertex/exact.h``."""
-
-    n_triangles: int
-    n_on_grid: int
-    n_asked: int
-    n_turns: int
-    n_expansions: int
-    n_integers: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +72,6 @@ class Facts:
     is_large_shapes: bool  # a few large triangles, whose colours are filled row by row
     work_ms: float  # of a single thread, as estimated before the draw
     census: tuple[tuple[int, float, float], ...]  # of each of CLASSES: triangles, samples in boxes, covered
-    decided: Decided | None = None  # with vertices that are not snapped
     clusters: ClusterFacts | None = None  # of a mesh
 
     def count(self, *names: str) -> int:
@@ -101,11 +87,6 @@ class Facts:
     def draws_planes(self) -> bool:
         """Whether each sample is drawn to a separate picture."""
         return self.view.sampling.n_samples > 1 and self.verb in ("rasterize", "fill")
-
-    @property
-    def draws_bands(self) -> bool:
-        """Whether each sample is drawn to a separate picture, in bands of rows."""
-        return self.draws_planes and not self.in_clusters
 
     @property
     def in_clusters(self) -> bool:
@@ -142,14 +123,13 @@ def find_facts(
     verb: str,
     outputs: tuple[str, ...],
     test: DepthTestOption | None,
-) -> tuple[Facts, NDArray[np.int32]]:
-    """Return the facts of a scene, and a read-only copy of its triangles; raises the errors of the verb."""
-    decided = count_decided(vertices, triangles, view) if view.is_exact else None
+) -> Facts:
+    """Return the facts of a scene; raises the errors of the verb."""
     caller_view, view = view, replace(view, is_exact=False)  # the census counts snapped triangles
     snapped = snap_mesh(FRESH, vertices, triangles, view, with_depth=verb == "rasterize", out=None)
     snapped.given.check_indices()
     caller_vertices, indices = as_array("vertices", vertices), as_array("triangles", triangles)
-    (points, source, indices_drawn, *_), pieces = snapped.given, snapped.pieces
+    points, source, pieces = snapped.given.points, snapped.given.source, snapped.pieces
     xy = snapped.records.view(np.int32).reshape(-1, 4)[:, :2]
     is_special = xy[:, 0] == np.iinfo(np.int32).min
     route, drawing = None, choices.drawing(view, snapped.work, find_sink(verb, view))
@@ -165,7 +145,7 @@ def find_facts(
     if 0 not in view.size and snapped.n_triangles:
         _, census = snapped.mesh.count_classes(drawing.sink, *view.size, samples)
     in_pixels = not source.is_clip_space and len(points) > 0
-    facts = Facts(
+    return Facts(
         verb=verb,
         outputs=outputs,
         view=caller_view,
@@ -189,27 +169,7 @@ def find_facts(
         is_large_shapes=filling is FillRoute.SHAPES,
         work_ms=choices.work_ns(view, snapped.work, drawing.sink) / 1e6,
         census=tuple(census),
-        decided=decided,
     )
-    checked = np.array(indices_drawn, np.int32)
-    checked.flags.writeable = False
-    return facts, checked
-
-
-def count_decided(vertices: ArrayLike, triangles: ArrayLike, view: View) -> Decided:
-    """Draw a scene without a snap, and return how the first sample of its pixels was decided."""
-    exact = snap_mesh(FRESH, vertices, triangles, view, with_depth=False, out=None)
-    mesh = exact.mesh
-    if view.sampling.n_samples > 1:
-        x, y = sample_positions(view.sampling.n_samples, view.grid_bits)[0].tolist()
-        mesh = mesh.at_sample(x, y)
-    width, height = view.size
-    if width and height:
-        covered = empty(engine.Target.covered_shape(height, width, 1), np.uint64)
-        target = engine.Target(Sink.MASK, empty((height, width), np.bool_), None, covered)
-        if mesh.draw(target, 0, height) >= 0:
-            exact.refuse()
-    return Decided(*mesh.exact.counts)  # type: ignore[union-attr]
 
 
 def find_sink(verb: str, view: View) -> Sink:
@@ -244,60 +204,3 @@ def find_cluster_facts(mesh: Mesh, view: View, verb: str, test: DepthTestOption 
     survey = seen.survey(n)
     n_outside, n_turned, n_drawn = round(survey.outside * n), round(survey.turned * n), seen.count_drawn(sink)
     return ClusterFacts(clusters, "", n_outside, n_turned, n - n_outside - n_turned - n_drawn, n_drawn)
-
-
-def memory_of(facts: Facts) -> tuple[dict[str, int], dict[str, int]]:
-    """Return the bytes of scratch, which is cached from call to call, and of results, by name.
-
-    Not included, since they depend on the data: a table of vertices beyond 2**30 sub-pixels, 16 bytes a vertex; the
-    pieces of cut triangles, about 100 bytes each; triangles in several bands of rows.
-    """
-    view, n = facts.view, facts.n_triangles
-    width, height = view.size
-    n_pixels, n_samples = width * height, view.sampling.n_samples
-    is_empty = n_pixels == 0
-    scratch = {"records": 0 if is_empty or not n else engine.VERTEX_BYTES * facts.n_vertices}
-    if view.is_exact:  # float64 pixels are read in place
-        taken = 24 if facts.is_clip_space else 8 * facts.n_components if facts.point_dtype != "float64" else 0
-        scratch = {"points": 0 if is_empty or not n else taken * facts.n_vertices}
-    if facts.index_dtype not in ("int32", "uint32"):
-        scratch["triangles"] = 12 * n
-    results = result_bytes(facts)
-    if facts.drawing.sink in (Sink.MASK, Sink.SAMPLES) and not is_empty:
-        scratch["covered"] = 8 * height * engine.Target.covered_shape(height, width, n_samples)[1]
-    if view.sampling is Sampling.AREA:
-        strips = facts.drawing.n_threads * engine.blend_cells(width)
-        in_bands, n_threads = facts.drawing.in_bands, facts.drawing.n_threads
-        of_sums = area_cells(height, width, n_threads, in_bands=in_bands) if n_pixels else 0
-        scratch["cells"] = 4 * (strips if facts.verb == "fill" else of_sums)
-    elif facts.verb == "fill" and n_samples == 1 and n and not (facts.is_direct or facts.is_large_shapes):
-        scratch["labels"] = 4 * n_pixels
-    elif facts.draws_bands and not is_empty and n and choices.can_slice(view) and not facts.is_large_shapes:
-        scratch |= band_bytes(n)
-    clusters = facts.clusters
-    if facts.in_clusters or (facts.route is Route.DEPTH and facts.drawing.is_bounded):
-        rows, segments = engine.Target.bounds_shape(height, width)
-        scratch["bounds"] = 4 * rows * segments
-    if clusters is not None and clusters.clusters is not None:  # the records are not needed, unless a plane cuts
-        scratch["records"] = 0 if not facts.n_clipped else scratch["records"]
-        scratch["clusters"] = 12 * len(clusters.clusters) + 4 * facts.drawing.n_threads * n + clusters.clusters.n_bytes
-    elif facts.in_bands:
-        scratch |= band_bytes(n)
-    elif facts.is_sliced:
-        scratch["outside"] = 4 * (n + 16 * facts.drawing.n_threads)
-    return scratch, results
-
-
-def result_bytes(facts: Facts) -> dict[str, int]:
-    """Return the bytes of the verb's results; colours have four bytes a pixel."""
-    width, height = facts.view.size
-    n_pixels, n_samples = width * height, facts.view.sampling.n_samples
-    many = facts.view.sampling is Sampling.AREA or n_samples > 1
-    if facts.verb == "rasterize":
-        return {"triangle": 4 * n_pixels * n_samples, "depth": 4 * n_pixels * n_samples}
-    if facts.verb == "fill":
-        planes = {"sample labels": 4 * n_pixels * n_samples} if n_samples > 1 else {}
-        return {"color": 4 * n_pixels, **planes}
-    if facts.verb == "overdraw":
-        return {"overdraw": 4 * n_pixels * n_samples}
-    return {"coverage": (4 if many else 1) * n_pixels}

@@ -1,34 +1,32 @@
-"""`plan`: the choices and memory of a draw, with reasons, before the draw.
+"""`plan`: the choices of a draw, with reasons, before the draw.
 
-In: the arguments of a verb. Out: a `Plan`: a table of choices and reasons, which verbs take as `plan=` to save checks.
+In: the arguments of a verb. Out: a `Plan`: a table of choices and reasons.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Unpack, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from topleft._core.base.array_types import MeshLike
-from topleft._core.base.arrays import as_count, as_names, as_size, as_triangles
+from topleft._core.base.arrays import as_count, as_names, as_size
 from topleft._core.base.memory import KeptMemory
 from topleft._core.base.options import Sampling, parse
 from topleft._core.raster.fill import Style, draw_fill
 from topleft._core.raster.rasterize import draw_coverage, draw_fragments, draw_overdraw, fragment_options
 from topleft._core.raster.static_mesh import draw_static
-from topleft._core.raster.view import CULL_CODES, View, ViewOptions
+from topleft._core.raster.view import Clock, View, ViewOptions
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.lod.detail import check_tolerance, choose_detail
 from topleft._meshes.model.mesh import Mesh
-from topleft._meshes.plan.facts import CLASSES, find_cluster_facts, find_facts, memory_of
+from topleft._meshes.plan.facts import CLASSES, find_cluster_facts, find_facts
 from topleft._meshes.plan.stages import Stage, find_stages, plan_detail
 from topleft._meshes.plan.table import as_html, as_text
-from topleft.methods import METHODS
 from topleft.typing import DepthTestOption, OutputOption
 
 #: Which verb gives an output.
@@ -42,34 +40,6 @@ OUTPUTS = {
     "barycentric": "rasterize",
     "interpolate": "rasterize",
 }
-
-#: Options that a plan fixes; calls may change transform, origin, viewport and the like.
-FIXED = ("size", "subpixel_bits", "sampling", "method", "cull")
-
-#: The names of options that a `View` holds as numbers.
-CODES: dict[str, dict[Any, str]] = {
-    "cull": {code: str(name) for name, code in CULL_CODES.items()},
-    "method": {method.code: name for name, method in METHODS.items()},
-}
-
-
-class Clock:
-    """The times of the stages of the last call."""
-
-    def __init__(self) -> None:
-        self.ns: dict[str, int] = {}
-        self._last = 0
-
-    def start(self) -> None:
-        """Begin a call."""
-        self.ns = {}
-        self._last = time.perf_counter_ns()
-
-    def mark(self, stage: str) -> None:
-        """End a stage."""
-        now = time.perf_counter_ns()
-        self.ns[stage] = self.ns.get(stage, 0) + now - self._last
-        self._last = now
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -89,8 +59,6 @@ class Plan:
         In the order of the pipeline: name, choice, why, rejected.
     classes : mapping of str to int
         Triangles, or pieces of cut triangles, by the code that draws them.
-    scratch_bytes, result_bytes : mapping of str to int
-        Memory by name: cached from call to call, and returned.
     threads : int
         How many threads draw.
 
@@ -109,20 +77,16 @@ class Plan:
     n_triangles: int
     stages: tuple[Stage, ...]
     classes: Mapping[str, int]
-    scratch_bytes: Mapping[str, int]
-    result_bytes: Mapping[str, int]
     threads: int
     _view: View = field(repr=False)
-    _triangles: NDArray[np.int32] = field(repr=False)
-    _triangles_given: ArrayLike = field(repr=False)
     _arguments: tuple[Any, ...] = field(repr=False)
     _mesh: Mesh | None = field(repr=False, default=None)
-    _clock: Clock = field(repr=False, default_factory=Clock)
+    _measured_ns: dict[str, int] = field(repr=False, default_factory=dict)
 
     @property
     def measured_ms(self) -> Mapping[str, float]:
-        """The times of the stages in the last call with this plan, in milliseconds; empty before the first call."""
-        return {name: ns / 1e6 for name, ns in self._clock.ns.items()}
+        """The times of the stages that `measure` has stored, in milliseconds; empty before."""
+        return {name: ns / 1e6 for name, ns in self._measured_ns.items()}
 
     def __repr__(self) -> str:
         width, height = self.size
@@ -153,8 +117,6 @@ class Plan:
             "n_triangles": self.n_triangles,
             "stages": stages,
             "classes": dict(self.classes),
-            "scratch_bytes": dict(self.scratch_bytes),
-            "result_bytes": dict(self.result_bytes),
             "threads": self.threads,
             "measured_ms": sum(measured.values()) if measured else None,
         }
@@ -166,88 +128,30 @@ class Plan:
         """
         n_rounds = as_count("n_rounds", n_rounds)
         memory = KeptMemory()
-        best: dict[str, int] = {}
-        for _ in range(n_rounds + 1):  # the first round touches the memory
-            self._run(memory)
-            if not best or sum(self._clock.ns.values()) < sum(best.values()):
-                best = self._clock.ns
-        self._clock.ns = best
+        clocks = [self._run(memory) for _ in range(n_rounds + 1)]  # the first round touches the memory
+        best = min(clocks, key=lambda clock: sum(clock.ns.values()))
+        self._measured_ns.update(best.ns)
         return self
 
-    def _run(self, memory: KeptMemory) -> None:
-        """Draw the scene."""
-        vertices, depth_test = self._arguments
-        view = self.fitted(self._view)
+    def _run(self, memory: KeptMemory) -> Clock:
+        """Draw the scene; returns its times."""
+        vertices, triangles, depth_test = self._arguments
+        clock = Clock()
+        view = self._view.but(threads=self.threads, clock=clock)
         if self.verb == "coverage":
-            draw_coverage(memory, vertices, self._triangles_given, view, None)
+            draw_coverage(memory, vertices, triangles, view, None)
         elif self.verb == "overdraw":
-            draw_overdraw(memory, vertices, self._triangles_given, view, None)
+            draw_overdraw(memory, vertices, triangles, view, None)
         elif self.verb == "rasterize" and self._mesh is not None:
             draw_static(memory, self._mesh, view, fragment_options(view, depth_test, None, None))
         elif self.verb == "rasterize":
             options = fragment_options(view, depth_test, None, None)
-            draw_fragments(memory, vertices, self._triangles_given, view, options)
+            draw_fragments(memory, vertices, triangles, view, options)
         else:
             colors = np.full((self.n_triangles, 4), 128, np.uint8)
             style = Style("triangle", None, "replace", "straight", "values")
-            self._clock.start()
-            draw_fill(memory, vertices, self._triangles_given, colors, view, style, None)
-
-    def fitted(self, view: View) -> View:
-        """Return the view of a call with this plan.
-
-        Raises
-        ------
-        ValueError
-            If the call asks for another size, sampling, method, side to cull or number of sub-pixel bits.
-        """
-        view.refuse_classic("plan")
-        if view.is_exact != self._view.is_exact:
-            wishes = ("exact" if view.is_exact else view.subpixel_bits for view in (self._view, view))
-            raise ValueError("plan is for subpixel_bits={!r}, got {!r}: make another with topleft.plan".format(*wishes))
-        for name in FIXED:
-            wish, fact = getattr(self._view, name), getattr(view, name)
-            if wish != fact:
-                names = CODES.get(name, {})
-                raise ValueError(
-                    f"plan is for {name}={names.get(wish, wish)}, got {names.get(fact, fact)}: make another with "
-                    "topleft.plan"
-                )
-        self._clock.start()
-        return replace(view, threads=view.threads or self.threads, plan=self)
-
-    def triangles_of(self, triangles: ArrayLike, n_vertices: int) -> NDArray[np.int32]:
-        """Return the plan's int32 triangles, whose indices have been checked.
-
-        The array that `plan` was called with is assumed unchanged; any other array is compared.
-
-        Raises
-        ------
-        ValueError
-            If the triangles differ, or there are more or fewer vertices.
-        """
-        if n_vertices != self.n_vertices:
-            raise ValueError(
-                f"plan is for {self.n_vertices} vertices, got {n_vertices}: make another with topleft.plan"
-            )
-        if triangles is not self._triangles_given:
-            others = as_triangles(triangles)
-            if others.shape != self._triangles.shape:
-                raise ValueError(
-                    f"plan is for {len(self._triangles)} triangles, got {len(others)}: make another with topleft.plan"
-                )
-            differs = (others != self._triangles).any(axis=1)
-            if differs.any():
-                row = int(np.argmax(differs))
-                raise ValueError(
-                    f"plan is for other triangles: row {row} was {self._triangles[row].tolist()}, "
-                    f"got {others[row].tolist()}; make another with topleft.plan"
-                )
-        return self._triangles
-
-    def mark(self, stage: str) -> None:
-        """Store the time at which a stage has ended."""
-        self._clock.mark(stage)
+            draw_fill(memory, vertices, triangles, colors, view, style, None)
+        return clock
 
 
 def plan(
@@ -263,9 +167,8 @@ def plan(
     """Return the plan of a draw: at each stage the choice, its reason and the rejected alternatives.
 
     Vertices are transformed, cut and snapped as the verb does it, and triangles are counted in the code that draws
-    them: the plan counts, it does not guess. It takes about as long as a draw. With
-    ``subpixel_bits="exact"`` the scene is drawn once, so that the plan has the number of samples in doubt and how they
-    were decided; its classes count the triangles with vertices on 2**-8 px.
+    them: the plan counts, it does not guess. It takes about as long as a draw. With ``subpixel_bits="exact"`` its
+    classes count the triangles with vertices on 2**-8 px.
 
     Parameters
     ----------
@@ -283,8 +186,7 @@ def plan(
     Returns
     -------
     Plan
-        ``.explain()`` is a table, ``.to_dict()`` the plan for JSON. As ``plan=`` of the verbs it saves the conversion
-        and the check of the triangles, and stores the time of each stage, as ``.measure()`` does.
+        ``.explain()`` is a table, ``.to_dict()`` the plan for JSON. ``.measure()`` stores the time of each stage.
 
     Raises
     ------
@@ -301,15 +203,11 @@ def plan(
     >>> flat = tl.plan(square, halves, (300, 300))
     >>> next(stage.choice for stage in flat.stages if stage.name == "depth")
     'no test, ids alone'
-    >>> tl.rasterize(square, halves, (300, 300), plan=flat).triangle[1, :4]
-    array([1, 0, 0, 0], dtype=int32)
     """
     wanted = as_names("outputs", outputs)
     verb = find_verb(wanted)
     test = None if depth_test is None else parse(DepthTestOption, "depth_test", depth_test)
     options = ViewOptions(**view)
-    if options.pop("plan", None) is not None:
-        raise TypeError("plan takes no plan=")
     detail: tuple[Stage, ...] = ()
     mesh: Mesh | None = None
     tolerance = check_tolerance(tolerance)
@@ -323,9 +221,7 @@ def plan(
     if checked.sampling in (Sampling.OUTER, Sampling.INNER, Sampling.AREA) and verb == "rasterize":
         raise ValueError(f"sampling {str(checked.sampling)!r} gives no ids: outputs must be 'coverage' or 'overdraw'")
     cluster_facts = None if mesh is None else find_cluster_facts(mesh, checked, verb, test)
-    facts, checked_triangles = find_facts(vertices, triangles, checked, verb, wanted, test)
-    facts = replace(facts, clusters=cluster_facts)
-    scratch, results = memory_of(facts)
+    facts = replace(find_facts(vertices, triangles, checked, verb, wanted, test), clusters=cluster_facts)
     return Plan(
         verb=verb,
         outputs=wanted,
@@ -334,13 +230,9 @@ def plan(
         n_triangles=facts.n_triangles,
         stages=(*detail, *find_stages(facts)),
         classes=MappingProxyType(dict(zip(CLASSES, (row[0] for row in facts.census), strict=True))),
-        scratch_bytes=MappingProxyType(scratch),
-        result_bytes=MappingProxyType(results),
         threads=max(1, facts.drawing.n_threads),
         _view=checked,
-        _triangles=checked_triangles,
-        _triangles_given=triangles,
-        _arguments=(vertices, depth_test),
+        _arguments=(vertices, triangles, depth_test),
         _mesh=mesh,
     )
 

@@ -15,7 +15,7 @@ from topleft._core.raster import choices
 from topleft._core.raster.choices import Route
 from topleft._core.raster.costs import cost_table
 from topleft._meshes.lod.detail import Detail
-from topleft._meshes.plan.facts import ClusterFacts, Decided, Facts, memory_of
+from topleft._meshes.plan.facts import ClusterFacts, Facts
 from topleft.methods import METHODS
 
 
@@ -55,7 +55,7 @@ def find_stages(facts: Facts) -> tuple[Stage, ...]:
     """Return the stages of a call."""
     stages = [plan_input(facts), *plan_vertices(facts), plan_arithmetic(facts), plan_cull(facts)]
     stages += [plan_method(facts), *plan_sink(facts)]
-    stages += [plan_threads(facts), plan_memory(facts)]
+    stages.append(plan_threads(facts))
     return tuple(stages if facts.clusters is None else with_clusters(stages, facts.clusters))
 
 
@@ -92,11 +92,6 @@ def plural(n: int, thing: str) -> str:
 def vertices(n: int) -> str:
     """Return a number of vertices."""
     return "1 vertex" if n == 1 else f"{n:,} vertices"
-
-
-def megabytes(n: int) -> str:
-    """Return a number of bytes with a unit."""
-    return f"{n:,} bytes" if n < 10_000 else f"{n / 1e3:,.0f} kB" if n < 10_000_000 else f"{n / 1e6:,.0f} MB"
 
 
 def plan_detail(detail: Detail) -> Stage:
@@ -183,8 +178,6 @@ def plan_clip(facts: Facts) -> Stage:
 
 def plan_arithmetic(facts: Facts) -> Stage:
     """Describe how many bits the edge functions need."""
-    if facts.decided is not None:
-        return plan_decisions(facts.decided)
     narrow, long = facts.count("tiny", "small", "middle", "rows"), facts.count("long", "edge 64", "span 64")
     wide = facts.count("edge 128", "span 128")
     parts = [f"{name}: {n:,}" for name, n in (("32-bit lanes", narrow), ("64-bit", long), ("128-bit", wide)) if n]
@@ -193,21 +186,6 @@ def plan_arithmetic(facts: Facts) -> Stage:
     if narrow and not wide:
         rejected = ("128 bits for all: the fullest model, and no bit of the picture would differ",)
     return Stage("arithmetic", ", ".join(parts) or "none", why, rejected, timed_in="method")
-
-
-def plan_decisions(decided: Decided) -> Stage:
-    """Describe how the samples of vertices that are not snapped were decided."""
-    parts = [f"{plural(decided.n_asked, 'sample or row end')} in doubt"]
-    if decided.n_on_grid:
-        parts.append(f"{plural(decided.n_on_grid, 'triangle')} on 2**-8 px, without rounding")
-    if decided.n_turns:
-        parts.append(f"the turn of {plural(decided.n_turns, 'triangle')}")
-    why = (
-        f"float32 and float64 lanes decide samples beyond their error; of the rest {decided.n_expansions:,} signs took "
-        f"sums of several float64, {decided.n_integers:,} integers of 2,176 bits"
-    )
-    rejected = ("the exact sign for every sample: 10 to 1,000 times as long for the same picture",)
-    return Stage("arithmetic", ", ".join(parts), why, rejected, timed_in="method")
 
 
 def plan_cull(facts: Facts) -> Stage:
@@ -344,13 +322,3 @@ def plan_threads(facts: Facts) -> Stage:
         return Stage("threads", f"{n_threads}, each a share of the triangles and its own rows", why, rejected)
     rejected = ("shares of the triangles: threads would have to meet twice",)
     return Stage("threads", f"{n_threads} bands of {-(-view.size[1] // max(1, n_threads)):,} rows", why, rejected)
-
-
-def plan_memory(facts: Facts) -> Stage:
-    """Describe which memory is allocated."""
-    scratch, results = memory_of(facts)
-    kept, returned = sum(scratch.values()), sum(results.values())
-    parts = ", ".join(f"{name} {megabytes(n)}" for name, n in (scratch | results).items() if n)
-    rejected = ("fresh memory for each frame: its first touch takes longer; a Rasterizer keeps it",)
-    choice = f"{megabytes(kept)} of scratch, {megabytes(returned)} of results, {megabytes(kept + returned)} at most"
-    return Stage("memory", choice, parts, rejected)

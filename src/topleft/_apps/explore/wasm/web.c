@@ -116,8 +116,7 @@ WEB_EXPORT(web_draw) int web_draw(int sink, int x, int y, void *pixels, float *d
     if (x || y) /* off the centre the grid is that of the samples, or a finer one */
         seen.mesh.sample_x_fx = x * (1 << (window->subpixel_bits - 4)),
         seen.mesh.sample_y_fx = y * (1 << (window->subpixel_bits - 4));
-    tl_exact_counts counts = {0};
-    tl_slice slice = {.end = seen.n_triangles, .is_first = 1, .is_last = 1, .counts = &counts};
+    tl_slice slice = {.end = seen.n_triangles, .is_first = 1, .is_last = 1};
     draw_mesh(&seen, window, &target, &slice);
     used = before;
     return 0;
