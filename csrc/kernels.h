@@ -143,12 +143,6 @@ TL_KERNEL(void, count_windows, const tl_window_span *spans, const int64_t *start
  * Returns the first triangle with an index outside the vertices, or -1. */
 TL_KERNEL(int64_t, take_corners, const tl_corners *mesh, const int32_t *which, int64_t first, int64_t n, void *out)
 
-/* Merges pixels [first, end) of two visibility buffers into the first buffer. */
-TL_KERNEL(void, merge_fragments, const tl_merge *merge, int64_t first, int64_t end)
-
-/* Replaces ids [first, end) by names[1 + id]. */
-TL_KERNEL(void, name_triangles, int32_t *ids, int64_t first, int64_t end, const int32_t *names)
-
 /* Draws n alpha-tested triangles over a target, NEAREST or PEEL, that has all other triangles; the window as for a
  * slice, and fewer than 2^31 pixels. */
 TL_KERNEL(void, cut_out, const tl_snapped *snapped, const tl_window *window, const tl_view *view,

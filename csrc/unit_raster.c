@@ -18,7 +18,6 @@
 #include "lines/edges.c"
 #include "lines/lines.c"
 #include "tiles/corners.c"
-#include "tiles/merge.c"
 #include "tiles/spans.c"
 #include "shade/alpha_test.c"
 

@@ -1,4 +1,4 @@
-/* The contract of windows of huge rasters: which triangles each window needs, and merged visibility buffers. */
+/* The contract of windows of huge rasters: which triangles each window needs. */
 #ifndef TOPLEFT_TILES_H
 #define TOPLEFT_TILES_H
 
@@ -34,19 +34,5 @@ typedef struct {
     int64_t triangle_stride;
     int is_wide;
 } tl_corners;
-
-/* Which of two triangles shows: that of smaller or of larger depth, at equal depth the lower index; or the larger
- * index. */
-typedef enum { TL_MERGE_LESS = 0, TL_MERGE_GREATER = 1, TL_MERGE_LATER = 2 } tl_merge_rule;
-
-/* Two visibility buffers of one picture; they are merged into the first. */
-typedef struct {
-    int32_t *ids; /* -1 for nothing */
-    float *depth;
-    const int32_t *other_ids;
-    const float *other_depth;
-    int32_t first_id; /* added to other_ids */
-    tl_merge_rule rule;
-} tl_merge;
 
 #endif

@@ -1,4 +1,4 @@
-# Windows of huge rasters: lists the triangles of each window, merges visibility buffers. Included by kernels.pyx.
+# Windows of huge rasters: lists the triangles of each window. Included by kernels.pyx.
 
 
 def list_spans(tiling: tuple[int, int, int, int, int], const double[:, :, ::1] corners_px, int64_t first_triangle,
@@ -73,22 +73,3 @@ cdef class StridedMesh:
             with nogil:
                 bad = K.take_corners(&self.mesh, &which[0] if which is not None else NULL, first, n, &out[0])
         return bad
-
-
-def merge_fragments(int32_t[::1] ids, float[::1] depth, const int32_t[::1] other_ids, const float[::1] other_depth,
-                    int32_t first_id, int rule, int64_t first, int64_t end):
-    """The kernel `merge_fragments`."""
-    cdef tl_merge m
-    if first >= end:
-        return
-    m.ids, m.depth, m.other_ids, m.other_depth = &ids[0], &depth[0], &other_ids[0], &other_depth[0]
-    m.first_id, m.rule = first_id, <tl_merge_rule>rule
-    with nogil:
-        K.merge_fragments(&m, first, end)
-
-
-def name_triangles(int32_t[::1] ids, int64_t first, int64_t end, const int32_t[::1] names):
-    """The kernel `name_triangles`."""
-    if first < end:
-        with nogil:
-            K.name_triangles(&ids[0], first, end, &names[0])

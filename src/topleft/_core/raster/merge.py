@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from topleft._core import engine
 from topleft._core.base.array_types import F32, I32
 from topleft._core.base.arrays import INT32_MAX, as_array, shown
 from topleft._core.base.options import parse
@@ -20,10 +19,11 @@ from topleft._core.base.threads import parse_threads, run_parts
 from topleft._core.raster.fragments import Fragments
 from topleft.typing import DepthTestOption
 
-RULES = {"less": 0, "greater": 1, None: 2}  # tl_merge_rule in csrc/tiles/tiles.h
-
 #: Pixels a thread; below that starting it costs more than it saves.
 MIN_PIXELS_PER_THREAD = 1 << 18
+
+#: Pixels that stay in the second-level cache while they are merged.
+PIXELS_AT_ONCE = 1 << 14
 
 
 def merge(
@@ -119,14 +119,22 @@ def _merge_into(
     threads: int | None,
 ) -> None:
     flat = ids.reshape(-1), depth.reshape(-1), own_ids.reshape(-1), own_depth.reshape(-1)
-    n_parts = max(1, ids.size // MIN_PIXELS_PER_THREAD) if threads is None else threads
-    rule, first_id = RULES[test], names if isinstance(names, int) else 0
 
     def merge_part(first: int, end: int) -> None:
-        if isinstance(names, np.ndarray):
-            engine.name_triangles(flat[2], first, end, names)
-        engine.merge_fragments(*flat, first_id, rule, first, end)
+        for at in range(first, end, PIXELS_AT_ONCE):
+            shown, z, other, other_z = (array[at : min(at + PIXELS_AT_ONCE, end)] for array in flat)
+            if isinstance(names, np.ndarray):
+                other = names[1 + other]
+            elif names:
+                other = np.where(other < 0, -1, other + np.int32(names))
+            takes = other > shown
+            if test is not None:
+                is_nearer = other_z < z if test == "less" else other_z > z
+                takes = (other >= 0) & ((shown < 0) | is_nearer | ((other_z == z) & (other < shown)))
+            np.copyto(shown, other, where=takes)
+            np.copyto(z, other_z, where=takes)
 
+    n_parts = max(1, ids.size // MIN_PIXELS_PER_THREAD) if threads is None else threads
     run_parts(merge_part, ids.size, min(n_parts, 64))
 
 
