@@ -414,9 +414,6 @@ TL_KERNEL(void, copy_texels, const int32_t *from, int64_t first, int64_t end, in
 TL_KERNEL(void, add_taken, const tl_taken *taken, const float *positions, const float *normals, const int32_t *ids,
           int64_t first, int64_t end, float *sums, float *weights)
 
-/* Rows [first, end) of the lowest visible height above the ground; NaN without ground, or too far away. */
-TL_KERNEL(void, view_heights, const tl_terrain *terrain, int64_t first, int64_t end, double *out)
-
 /* Columns of tl_crossings.  `fill_columns` fills them by the even-odd rule in place, returns the number of columns with
  * an odd count, and adds those with winding numbers other than 0 and 1, and than 0 and -1, to n_nested (2).
  * `expand_columns` writes a byte for each voxel, `count_columns` a share, n_steps a column; `scatter_columns` each bit

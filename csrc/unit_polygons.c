@@ -14,7 +14,6 @@
 #include "polygons/shares.c"
 #include "polygons/simple.c"
 #include "grid/atlas.c"
-#include "grid/viewshed.c"
 #include "grid/voxels.c"
 
 #include "unit.h"

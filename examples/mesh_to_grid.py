@@ -1,4 +1,4 @@
-"""A mesh on three grids: solid voxels, a normal map baked from a finer mesh, and what is seen of hills from a tower."""
+"""A mesh on two grids: solid voxels, and a normal map baked from a finer mesh."""
 
 import numpy as np
 from picture import beside, output_path, ramp
@@ -35,19 +35,8 @@ def normal_map() -> np.ndarray:
     return np.rint(127.5 + 127.5 * baked.values).astype(np.uint8)
 
 
-def viewshed() -> np.ndarray:
-    """Hills by their height; what is not seen from the tower is dark."""
-    x, y = np.meshgrid(np.arange(SIZE[0]), np.arange(SIZE[1]))
-    hills = 20 * np.sin(x / 17) * np.cos(y / 15) + 9 * np.sin(x / 7 + y / 10) + 6 * np.cos(y / 6 - x / 13)
-    seen = tl.viewshed(hills, (70.5, 80.5), eye_height=12)
-    picture = ramp(hills)
-    picture[~seen.visible] //= 3
-    picture[77:84, 67:74] = (60, 220, 255)
-    return picture
-
-
 def main() -> None:
-    tl.save_image(output_path(__doc__), beside(voxels(), normal_map(), viewshed()))
+    tl.save_image(output_path(__doc__), beside(voxels(), normal_map()))
 
 
 if __name__ == "__main__":

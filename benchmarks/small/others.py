@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -188,7 +185,7 @@ OTHER_FIELDS = {
 
 
 def grids_beside_others() -> Scenes:
-    """Voxels beside trimesh's, a gutter beside SciPy's nearest, and a viewshed of a million cells."""
+    """Voxels beside trimesh's, a gutter beside SciPy's nearest, and visible triangles beside Open3D's."""
     import topleft as tl
 
     vertices, triangles = tl.scenes.blob(70_000)
@@ -204,11 +201,6 @@ def grids_beside_others() -> Scenes:
     mask = tl.bake(atlas, "triangle", 1024, gutter=0).mask
     other = installed({"scipy's nearest alone": partial(scipy_nearest, mask)})
     yield "atlas of 200,000 triangles, 1024x1024", bare | other
-    x, y = np.meshgrid(np.arange(1000), np.arange(1000))
-    hills = 40 * np.sin(x / 97) * np.cos(y / 83) + 9 * np.sin(x / 23 + y / 31)
-    views = {"topleft": partial(tl.viewshed, hills, (500.5, 400.5), eye_height=9.0, threads=1)}
-    with TemporaryDirectory() as folder:
-        yield "viewshed of 1000x1000", views | installed({"gdal_viewshed": partial(gdal_viewshed, hills, Path(folder))})
     mesh = tl.Mesh(vertices, triangles)
     cameras = tl.viewpoints(mesh, 20)
     seen = {"topleft visible_faces": partial(tl.visible_faces, mesh, cameras, (512, 512))}
@@ -229,21 +221,6 @@ def scipy_nearest(mask: NDArray[Any]) -> Callable[[], object]:
     from scipy.ndimage import distance_transform_edt
 
     return lambda: distance_transform_edt(~mask, return_indices=True)
-
-
-def gdal_viewshed(heights: NDArray[Any], folder: Path) -> Callable[[], object]:
-    """The program of GDAL on a GeoTIFF, the eye in the middle of cell (500, 400)."""
-    import rasterio
-
-    path, height = folder / "heights.tif", len(heights)
-    profile = {"driver": "GTiff", "width": heights.shape[1], "height": height, "count": 1, "dtype": "float64"}
-    where = rasterio.Affine(1, 0, 0, 0, -1, height)
-    with rasterio.open(path, "w", **profile, transform=where, crs="EPSG:32632") as file:
-        file.write(heights, 1)
-    words = ["-ox", "500.5", "-oy", f"{height - 400.5}", "-oz", "9", "-tz", "0", "-md", "0", "-cc", "0"]
-    command = ["gdal_viewshed", "-q", *words, str(path), str(folder / "seen.tif")]
-    subprocess.run(command, check=True)
-    return partial(subprocess.run, command, check=True)
 
 
 def open3d_rays(vertices: NDArray[Any], triangles: NDArray[Any], cameras: Sequence[Any]) -> Callable[[], object]:

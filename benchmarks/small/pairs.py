@@ -270,7 +270,7 @@ PAIRS = {
     "objects": Pairs(objects_beside_bop, "time full and visible masks of objects beside the loop of BOP's tools", 7),
     "field": Pairs(field_beside_others, "time a field beside matplotlib, datashader and SciPy", 7),
     "gradients": Pairs(gradients_beside_deodr, "time forward and backward of topleft.torch beside DEODR", 12),
-    "grids": Pairs(grids_beside_others, "time voxels, atlases and a viewshed beside other programs", 5),
+    "grids": Pairs(grids_beside_others, "time voxels and atlases beside other programs", 5),
 }
 
 

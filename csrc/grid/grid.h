@@ -1,4 +1,4 @@
-/* The contract of csrc/grid: a mesh on the texels of its texture coordinates, and the viewshed of a height grid. */
+/* The contract of csrc/grid: a mesh on the texels of its texture coordinates. */
 #ifndef TOPLEFT_GRID_H
 #define TOPLEFT_GRID_H
 
@@ -27,21 +27,5 @@ typedef struct {
     double clip_from_object[16];
     double eye[4]; /* homogeneous: a position, or with eye[3] = 0 a direction */
 } tl_taken;
-
-#define TL_VIEW_BLOCK 16
-
-/* A height grid and an observer. */
-typedef struct {
-    const double *heights; /* (height, width), NaN where there is none */
-    int64_t width;
-    /* (ceil(height / TL_VIEW_BLOCK), n_blocks): the greatest height of cells [b, b + TL_VIEW_BLOCK] along both axes */
-    const double *blocks;
-    int64_t n_blocks;
-    double eye[3];         /* column, row and height; centres of cells are whole numbers; within the grid */
-    const double *ways[2]; /* 1 / (k - eye) of each column, and of each row; not read where k = eye */
-    double cell[2];        /* width and height of a cell */
-    double curvature;      /* how far the ground falls per unit of squared distance */
-    double most_squared;   /* squared distance of the farthest cells */
-} tl_terrain;
 
 #endif

@@ -22,8 +22,7 @@ All names, by task:
                   choose_detail, Detail
     views         render_layers, ViewLayers, rasterize_mesh, SceneFragments, shade, object_masks, ObjectMasks,
                   visible_layers, SceneDepthLayers
-    grids         field, height_map, Grid, voxelize, Voxels, bake, Baked, viewshed, Viewshed, visible_faces,
-                  VisibleFaces
+    grids         field, height_map, Grid, voxelize, Voxels, bake, Baked, visible_faces, VisibleFaces
     tiles         tiles, Tiles, Window, merge
     tools         plan, Plan, explore, Explorer, scenes, build_info, release_memory, __version__
     errors        TopleftError, MeshError, ImageError, MissingPackageError, MeshWarning
@@ -84,7 +83,6 @@ if TYPE_CHECKING:
     from topleft._apps.tiles.tiles import Tiles, tiles
     from topleft._core.raster.merge import merge
     from topleft._meshes.grid.bake import Baked, bake
-    from topleft._meshes.grid.viewshed import Viewshed, viewshed
     from topleft._meshes.grid.voxels import Voxels, voxelize
     from topleft._meshes.picture.object_masks import ObjectMasks, object_masks
     from topleft._meshes.picture.transparent import render_transparent, visible_layers
@@ -99,7 +97,6 @@ _LATE = {
     "ObjectMasks": "topleft._meshes.picture.object_masks",
     "Tiles": "topleft._apps.tiles.tiles",
     "ViewLayers": "topleft._meshes.picture.view_layers",
-    "Viewshed": "topleft._meshes.grid.viewshed",
     "VisibleFaces": "topleft._apps.batch.visible",
     "Voxels": "topleft._meshes.grid.voxels",
     "Window": "topleft._meshes.windows.raster",
@@ -112,7 +109,6 @@ _LATE = {
     "render_layers": "topleft._meshes.picture.view_layers",
     "render_transparent": "topleft._meshes.picture.transparent",
     "tiles": "topleft._apps.tiles.tiles",
-    "viewshed": "topleft._meshes.grid.viewshed",
     "visible_faces": "topleft._apps.batch.visible",
     "visible_layers": "topleft._meshes.picture.transparent",
     "voxelize": "topleft._meshes.grid.voxels",
@@ -157,7 +153,6 @@ __all__ = [
     "Tiles",
     "TopleftError",
     "ViewLayers",
-    "Viewshed",
     "VisibleFaces",
     "Voxels",
     "Window",
@@ -202,7 +197,6 @@ __all__ = [
     "to_rle",
     "turntable",
     "viewpoints",
-    "viewshed",
     "visible_faces",
     "visible_layers",
     "voxelize",

@@ -145,11 +145,6 @@ def test_masked_values_of_a_field_leave_their_triangles_out():
     )
 
 
-def test_masked_heights_are_no_ground():
-    seen = tl.viewshed(masked(np.full((5, 5), -9999.0), slice(1, 5)), (2.5, 0.5))
-    assert np.array_equal(np.isnan(seen.above).all(axis=1), np.arange(5) > 0)
-
-
 def test_masked_vertices_count_where_triangles_use_them():
     assert tl.coverage(masked(SQUARE, 3), HALVES[:1], (4, 4)).sum() == 10
     with pytest.raises(ValueError, match=r"must be finite where a triangle uses them, got \[nan, nan\] in row 3"):

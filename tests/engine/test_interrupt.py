@@ -113,7 +113,6 @@ DRAWS = {
     "table of triangles": lambda n: tl.overlap(flat()[0], SIZE, triangles=flat()[1], threads=n),
     "tiles": lambda n: list(tl.tiles(flat(), SIZE, kind="overdraw", sampling="area", window=500, threads=n)),
     "merge": lambda n: tl.merge([buffer()] * 3000, threads=n),
-    "viewshed": lambda n: tl.viewshed(np.zeros((2000, 2000)), (1000.5, 1000.5), eye_height=2.0, threads=n),
     "gradients of areas": lambda n: tl.area_vjp(*flat(), SIZE, np.ones(SIZE), threads=n),
     "bake from a source": lambda n: tl.bake(SHEET, "position", 2000, source=BALL, threads=n),
     "voxelize": lambda n: tl.voxelize(BALL, 600, samples=4, threads=n),
@@ -134,7 +133,7 @@ HEARD = {
     "draw_mesh": "coverage by edges", "draw_area": "coverage by area", "blend": "fill over",
     "draw_lines": "smooth wireframe", "draw_cloud": "points", "shade": "shade", "mask_even_odd": "mask of a polygon",
     "mask_nonzero": "mask of a nonzero polygon", "label_polygons": "labels of polygons",
-    "share_polygons": "polygons by area", "merge_fragments": "merge", "view_heights": "viewshed",
+    "share_polygons": "polygons by area",
     "grad_area": "gradients of areas", "nearest_of_points": "bake from a source", "count_columns": "voxelize",
     "fill_columns": "voxelize", "touch_voxels": "voxelize a surface",
 }  # fmt: skip

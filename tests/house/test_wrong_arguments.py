@@ -139,9 +139,6 @@ CALLS = {
                                    "tolerance": 0.0, "threads": None, "out": None}),
     "turntable": (tl.turntable, {"subject": CUBE, "n": 2}),
     "viewpoints": (tl.viewpoints, {"subject": CUBE, "n": 2}),
-    "viewshed": (tl.viewshed, {"terrain": np.zeros((3, 4)), "eye": (1, 1), "grid": None, "pixel_size": None,
-                               "eye_height": None, "target_height": 0.0, "max_distance": None, "curvature": 0.0,
-                               "threads": None}),
     "visible_faces": (tl.visible_faces, {"mesh": CUBE, "cameras": [CAMERA], "size": SIZE, "min_pixels": 1, "cull": None,
                                          "executor": None}),
     "voxelize": (tl.voxelize, {"mesh": CUBE, "shape": 4, "pitch": None, "bounds": None, "solid": True, "rule": "center",
@@ -383,7 +380,7 @@ def test_every_public_callable_is_tried():
     others = {"simplify", "release_memory", "build_info"}  # the first takes seconds, the others nothing
     made = {"DepthLayers", "Detail", "Fragments", "FragmentsBatch", "Level", "Levels", "Plan", "SceneDepthLayers",
             "SceneFragments", "ViewLayers", "ImageError", "MeshError", "MissingPackageError", "TopleftError",
-            "MeshWarning", "Explorer", "ObjectMasks", "Overlap", "Tiles", "Window", "Baked", "Viewshed",
+            "MeshWarning", "Explorer", "ObjectMasks", "Overlap", "Tiles", "Window", "Baked",
             "VisibleFaces", "Voxels"}  # fmt: skip
     public = {name for name in tl.__all__ if callable(getattr(tl, name)) and not inspect.ismodule(getattr(tl, name))}
     assert public <= set(CALLS) | others | made

@@ -32,7 +32,7 @@ KEYWORDS = (ViewOptions, LookOptions, FramingOptions)
 #: Classes that functions return: their constructors are not promised, their attributes are.
 RESULTS = (
     tl.Baked, tl.DepthLayers, tl.Detail, tl.Explorer, tl.Fragments, tl.FragmentsBatch, tl.ObjectMasks, tl.Overlap,
-    tl.Plan, tl.PointFragments, tl.SceneDepthLayers, tl.SceneFragments, tl.Tiles, tl.ViewLayers, tl.Viewshed,
+    tl.Plan, tl.PointFragments, tl.SceneDepthLayers, tl.SceneFragments, tl.Tiles, tl.ViewLayers,
     tl.VisibleFaces, tl.Voxels, tl.Window,
 )  # fmt: skip
 

@@ -140,13 +140,12 @@ def backward(changing: Changing) -> Case:
 
 
 def grids(changing: Changing) -> Case:
-    """Voxels, viewsheds and atlases."""
+    """Voxels and atlases."""
     draw, rng = changing.draw, changing.rng
     n = draw.of([12, 1, 200])
     vertices = changing.share("vertices", rng.uniform(0, 1, (3 * n, 3)).astype(draw.of(["f8", "f4"])))
     triangles = changing.share("triangles", np.arange(3 * n).reshape(n, 3).astype(draw.of(["i4", "i8"])), 3 * n)
     uv, values = changing.numbers("uv", (3 * n, 2), 0, 1, "f4 f8"), changing.numbers("values", (3 * n, 2), 0, 1)
-    heights = changing.numbers("heights", (draw.of([9, 2, 40]), draw.of([7, 30])), 0, 9, "f8 f4")
     picture = changing.numbers("picture", (20, 30, 3), 0, 255, "u1")
     rule = draw.of(["center", "touched", "area"])
     camera = tl.Camera.look_at((4, 3, 2), (0.5, 0.5, 0.5))
@@ -155,7 +154,6 @@ def grids(changing: Changing) -> Case:
         mesh = tl.Mesh(vertices, triangles, uv=uv)
         attempts(
             lambda: tl.voxelize(mesh, 12, solid=draw.chance(2), rule="touched" if rule == "touched" else "center"),
-            lambda: tl.viewshed(heights, (1.5, 1.2), eye_height=1.0),
             lambda: tl.bake(mesh, values, (33, 20), rule=rule, gutter=3),
             lambda: tl.bake(mesh, [picture], 24, rule=rule, cameras=[camera]),
         )

@@ -26,7 +26,7 @@ from draws import (
     out_of,
     view_of,
 )
-from fuzzing_grids import bake_case, gradients_case, rle_case, seen_case, viewshed_case, voxels_case
+from fuzzing_grids import bake_case, gradients_case, rle_case, seen_case, voxels_case
 
 import topleft as tl
 
@@ -435,7 +435,6 @@ KINDS: dict[str, Callable[[Draw], Case]] = {
     "gradients": gradients_case,
     "rle": rle_case,
     "voxels": voxels_case,
-    "viewshed": viewshed_case,
     "bake": bake_case,
     "seen": seen_case,
 }

@@ -118,29 +118,6 @@ def voxels_case(draw: Draw) -> Case:
     return Case("voxelize", call, (vertices, triangles), options)
 
 
-def viewshed_case(draw: Draw) -> Case:
-    """`viewshed` of heights."""
-    shape = draw.mostly([(9, 12), (70, 33), (1, 5), (2, 2)], [(0, 5), (1, 1)])
-    heights = draw.laid_out(draw.as_dtype(draw.numbers(draw.shape(*shape), 0, 9), DTYPES))
-    eye = draw.mostly([(1.0, 1.0), (2.5, 1.5), (1.0, 1.0, 20.0), (4, 0)], [(0,), (-5.0, 1.0), (float("nan"), 1.0),
-                      (1.0, float("inf")), (1.0, 1.0, 1e300)])  # fmt: skip
-    options: dict[str, Any] = {"eye": eye, "threads": draw.of([1, None, 2])}
-    options["target_height"] = draw.mostly([0.0, 1.5], [-1.0, *SPECIAL])
-    options["curvature"] = draw.mostly([0.0, 0.01], [-1.0, *SPECIAL])
-    if draw.chance(3):
-        options["max_distance"] = draw.mostly([5.0, 0.5], [0.0, -1.0, *SPECIAL])
-    if draw.chance(3):
-        options["pixel_size"] = draw.mostly([1.0, (0.5, 2.0)], [0.0, -1.0, *SPECIAL])
-    if draw.chance(3):
-        options["eye_height"] = draw.mostly([1.7, 0.0], SPECIAL)
-
-    def call(heights: Any, **options: Any) -> Any:
-        seen = tl.viewshed(heights, **options)
-        return [seen.visible, seen.above]
-
-    return Case("viewshed", call, (heights,), options)
-
-
 def bake_case(draw: Draw) -> Case:
     """`bake`, from the mesh itself, another one, or a picture."""
     size = draw.mostly([(20, 30), (64, 65), (1, 1), 33], [0, (5, 0), -1, 2**31, (2**31, 2**31)])

@@ -162,28 +162,3 @@ def add_taken(const int32_t[:, ::1] seen, const float[:, ::1] depth, const float
         taken.eye[k] = eye[k]
     with nogil:
         K.add_taken(&taken, &positions[0, 0], &normals[0, 0], &ids[0], first, end, &sums[0, 0], &weights[0])
-
-
-VIEW_BLOCK = TL_VIEW_BLOCK
-
-
-def view_heights(const double[:, ::1] heights, const double[:, ::1] blocks, const double[::1] eye, const double[::1] columns, const double[::1] rows,
-                 const double[::1] cell, double curvature, double most_squared, int64_t first, int64_t end,
-                 double[:, ::1] out):
-    """Write the least height above the ground that is visible from `eye`, (column, row, height), in rows [first, end).
-
-    `blocks`: the greatest height of VIEW_BLOCK + 1 cells along both axes. `columns`, `rows`: 1 / (k - eye) of each k.
-    """
-    cdef tl_terrain terrain
-    cdef int k
-    if end <= first or not heights.shape[1]:
-        return
-    terrain.heights, terrain.width = &heights[0, 0], heights.shape[1]
-    terrain.blocks, terrain.n_blocks = &blocks[0, 0], blocks.shape[1]
-    terrain.ways[0], terrain.ways[1] = &columns[0], &rows[0]
-    terrain.curvature, terrain.most_squared = curvature, most_squared
-    for k in range(3):
-        terrain.eye[k] = eye[k]
-    terrain.cell[0], terrain.cell[1] = cell[0], cell[1]
-    with nogil:
-        K.view_heights(&terrain, first, end, &out[0, 0])
