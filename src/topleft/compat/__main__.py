@@ -50,11 +50,17 @@ def install_mujoco() -> None:
     import_module("topleft.compat.mujoco").install()
 
 
+def install_nvdiffrast() -> None:
+    """Have `import nvdiffrast.torch` give `topleft.torch`, on the CPU where the program names CUDA."""
+    import_module("topleft.compat.nvdiffrast").install()
+
+
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "trimesh": install_trimesh,
     "mujoco": install_mujoco,
     "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
+    "nvdiffrast": install_nvdiffrast,
     "pytorch3d": install_pytorch3d,
     "custom_rasterizer": stands_for("custom_rasterizer", module="custom_rasterizer"),
     "texture_baker": stands_for("texture_baker", module="texture_baker"),

@@ -1,15 +1,13 @@
-"""Run a program for nvdiffrast on the CPU as it is: `python -m topleft.nvdiffrast PROGRAM ...`.
+"""Programs for nvdiffrast on the CPU as they are: `python -m topleft.compat nvdiffrast PROGRAM ...`.
 
-`import nvdiffrast.torch` gives it `topleft.torch`. The CPU takes the place of a device "cuda": for tensors that are
+`import nvdiffrast.torch` gives them `topleft.torch`. The CPU takes the place of a device "cuda": for tensors that are
 made or moved there, `.cuda()`, and the calls of `torch.cuda` that wait, seed or empty. One line on stderr says so.
 """
 
 from __future__ import annotations
 
-import runpy
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -18,7 +16,7 @@ from torch.overrides import TorchFunctionMode
 
 import topleft.torch
 
-__all__ = ["main"]
+__all__ = ["install"]
 
 #: Functions of `torch.cuda` that then do nothing.
 WITHOUT_DEVICE = (
@@ -51,28 +49,13 @@ class OnCpu(TorchFunctionMode):  # type: ignore[misc]
         return func(*map(on_cpu, args), **{name: on_cpu(value) for name, value in (kwargs or {}).items()})
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the program that the first argument names, with the others; returns the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    if not given or given[0] in ("-h", "--help"):
-        sys.stderr.write("usage: python -m topleft.nvdiffrast PROGRAM [its arguments]\n")
-        return 0 if given else 2
-    if not Path(given[0]).is_file():
-        sys.stderr.write(f"topleft.nvdiffrast: there is no file {given[0]!r}\n")
-        return 2
+def install() -> None:
+    """Have `import nvdiffrast.torch` give `topleft.torch`, and PyTorch take the CPU for CUDA."""
     package = ModuleType("nvdiffrast")
     package.torch = topleft.torch  # type: ignore[attr-defined]
     sys.modules.update({"nvdiffrast": package, "nvdiffrast.torch": topleft.torch})
     for name in WITHOUT_DEVICE:
         setattr(torch.cuda, name, lambda *_, **__: None)
     torch.nn.Module.cuda = lambda module, device=None: module  # noqa: ARG005
-    sys.argv = given
-    sys.path.insert(0, str(Path(given[0]).resolve().parent))
-    sys.stderr.write("topleft.nvdiffrast: calls for 'cuda' run on the CPU\n")
-    with OnCpu():
-        runpy.run_path(given[0], run_name="__main__")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    sys.stderr.write("topleft.compat: calls for 'cuda' run on the CPU\n")
+    OnCpu().__enter__()

@@ -6,7 +6,6 @@ import sys
 import pytest
 
 pytest.importorskip("torch")
-nvdiffrast = pytest.importorskip("topleft.nvdiffrast")
 
 PROGRAM = """
 import sys
@@ -32,19 +31,7 @@ print(sys.argv[1:], dr.get_log_level(), int((rast[..., 3] > 0).sum()), bool(colo
 
 def test_program_that_names_cuda_runs(tmp_path):
     tmp_path.joinpath("program.py").write_text(PROGRAM)
-    command = [sys.executable, "-m", "topleft.nvdiffrast", str(tmp_path / "program.py"), "--steps", "3"]
+    command = [sys.executable, "-m", "topleft.compat", "nvdiffrast", str(tmp_path / "program.py"), "--steps", "3"]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert done.stderr == "topleft.nvdiffrast: calls for 'cuda' run on the CPU\n"
+    assert done.stderr == "topleft.compat: calls for 'cuda' run on the CPU\n"
     assert done.stdout == "['--steps', '3'] 2 66 True cpu\n"
-
-
-def test_program_that_is_not_there_is_named(capsys):
-    assert nvdiffrast.main(["nothing.py"]) == 2
-    assert capsys.readouterr().err == "topleft.nvdiffrast: there is no file 'nothing.py'\n"
-
-
-def test_without_a_program_says_how_it_is_used(capsys):
-    assert nvdiffrast.main([]) == 2
-    assert nvdiffrast.main(["--help"]) == 0
-    usage = "usage: python -m topleft.nvdiffrast PROGRAM [its arguments]\n"
-    assert capsys.readouterr().err == usage * 2
