@@ -14,7 +14,7 @@ POS = [
 ]  # fmt: skip
 TRI = [[0, 1, 2], [3, 4, 5]]
 
-# what the kernel of Hunyuan3D for the CPU returns of these two faces, and of those that lie behind z / w = -0.1
+# what the kernel of Hunyuan3D for the CPU returns of these two faces
 RECORDED = """
 0 0 0 0 0 0 0 0 0
 0 0 0 0 2 1 1 1 1
@@ -23,24 +23,16 @@ RECORDED = """
 0 0 2 2 2 1 2 0 0
 0 0 0 0 0 0 0 0 0
 """
-BEHIND = """
-0 0 0 0 0 0 0 0 0
-0 0 0 0 2 1 1 1 1
-0 1 1 2 1 1 1 1 0
-0 0 0 1 1 1 1 0 0
-0 0 0 0 2 2 2 0 0
-0 0 0 0 0 0 0 0 0
-"""
 
 
 def table(text):
     return [[int(word) for word in row.split()] for row in text.split("\n") if row]
 
 
-def by_hand(pos, tri, size, prior=-np.inf):
+def by_hand(pos, tri, size):
     """Each pixel and each face: the plane through the eye and an edge, z / w, and the rule for what is nearest."""
     height, width = size
-    ids, weights, prior = np.zeros(size, int), np.zeros((*size, 3)), np.broadcast_to(prior, size)
+    ids, weights = np.zeros(size, int), np.zeros((*size, 3))
     for row, column in np.ndindex(size):
         p = np.array([2 * column / (width - 1) - 1, 2 * row / (height - 1) - 1, 1])
         best = np.inf
@@ -50,7 +42,7 @@ def by_hand(pos, tri, size, prior=-np.inf):
             sides = np.array([np.cross(flat[(i + 1) % 3], flat[(i + 2) % 3]) @ p for i in range(3)])
             own = sides / sides.sum()
             depth = (own @ z) / (own @ w)
-            if own.min() > 0 and own @ w > 0 and max(prior[row, column] + 2e-6, -1) < depth < best:
+            if own.min() > 0 and own @ w > 0 and -1 < depth < best:
                 ids[row, column], weights[row, column], best = f + 1, own, depth
     return ids, weights
 
@@ -71,37 +63,12 @@ def test_faces_are_those_of_the_kernel_for_the_cpu():
     assert not barycentric[0].any()
 
 
-def test_faces_behind_a_depth_are_those_of_the_kernel_for_the_cpu():
-    findices, _ = cr.rasterize([POS], TRI, SIZE, np.full(SIZE, -0.1, np.float32), 1)
-    assert findices.tolist() == table(BEHIND)
-
-
 @pytest.mark.parametrize("size", [(8, 11), (11, 8), (2, 2)])
 @pytest.mark.parametrize("seed", range(3))
 def test_faces_and_weights_are_those_of_each_pixel_by_hand(size, seed):
     pos, tri = random_faces(seed)
     findices, barycentric = cr.rasterize(pos, tri, size)
     ids, weights = by_hand(pos[0], tri, size)
-    assert np.array_equal(findices, ids)
-    assert np.abs(barycentric - weights).max() < 1e-6
-
-
-def test_depth_prior_uncovers_one_face_after_the_other():
-    """Eighteen faces at z = -0.9, -0.8 and so on; the 16 nearest are looked at."""
-    z = np.round(np.arange(18) / 10 - 0.9, 1).astype(np.float32)
-    pos = np.array([[[x, y, own, 1] for own in z for x, y in ((-3, -3), (3, -3), (0, 4))]], np.float32)
-    tri = np.arange(3 * len(z)).reshape(-1, 3)
-    for k in (0, 2, 3, 4, 14, 15, 16):
-        findices, barycentric = cr.rasterize(pos, tri, (4, 5), np.full((4, 5), z[k]), 1)
-        assert (findices == (k + 2 if k < 15 else 0)).all()
-        assert np.allclose(barycentric.sum(axis=2), k < 15)
-
-
-def test_depth_prior_holds_for_each_pixel():
-    pos, tri = random_faces(5)
-    prior = np.random.default_rng(1).uniform(-1, 1, SIZE).astype(np.float32)
-    findices, barycentric = cr.rasterize(pos, tri, SIZE, prior, 1)
-    ids, weights = by_hand(pos[0], tri, SIZE, prior)
     assert np.array_equal(findices, ids)
     assert np.abs(barycentric - weights).max() < 1e-6
 
@@ -115,11 +82,6 @@ def test_interpolated_colours_are_sums_of_those_of_the_corners():
     assert found.shape == (1, *SIZE, 5)
     assert np.allclose(found[0], expected, rtol=1e-6)
     assert not found[0][findices == 0].any()
-
-
-def test_depth_prior_of_another_shape_is_refused():
-    with pytest.raises(ValueError, match=r"clamp_depth must have shape \(6, 9\), got \(9, 6\)"):
-        cr.rasterize([POS], TRI, SIZE, np.zeros((9, 6)), 1)
 
 
 def test_tensors_give_tensors_with_gradients():

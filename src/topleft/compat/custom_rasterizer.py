@@ -15,16 +15,8 @@ from topleft.compat._arrays import detached, interpolated, library_of
 
 __all__ = ["interpolate", "rasterize"]
 
-LAYERS = (4, 16)
-"""How many faces of a pixel are looked at for one behind a given depth; more where those do not tell."""
 
-TRUNCATION = 1e-6
-"""How far behind the given depth a face must lie, in window depth."""
-
-
-def rasterize(
-    pos: Any, tri: Any, resolution: tuple[int, int], clamp_depth: Any = None, use_depth_prior: int = 0
-) -> tuple[Any, Any]:
+def rasterize(pos: Any, tri: Any, resolution: tuple[int, int]) -> tuple[Any, Any]:
     """Return the nearest face of each pixel, and the weights of its vertices.
 
     Parameters
@@ -34,10 +26,6 @@ def rasterize(
     tri : (F, 3) integers
     resolution : (height, width)
         Pixels.
-    clamp_depth : (H, W) float, optional
-        z / w; looked at with `use_depth_prior`.
-    use_depth_prior : int
-        Other than 0: the nearest face that lies behind `clamp_depth`, of the 16 nearest of the pixel.
 
     Returns
     -------
@@ -49,7 +37,7 @@ def rasterize(
     Raises
     ------
     ValueError, TypeError, IndexError
-        As in `topleft.rasterize`; also if `clamp_depth` has another shape.
+        As in `topleft.rasterize`.
 
     Notes
     -----
@@ -70,26 +58,8 @@ def rasterize(
     # centres at -1 and 1 are half a pixel within the picture; y goes down
     inwards = [(width - 1) / width, (1 - height) / height, 1, 1]
     clip, faces = detached(pos)[0].astype(np.float64) * inwards, detached(tri)
-    options: dict[str, Any] = {"subpixel_bits": "exact", "far_clip": False}
-    if not use_depth_prior:
-        frags = tl.rasterize(clip, faces, (width, height), **options)
-        return of.asarray(frags.triangle + 1), of.asarray(frags.barycentric())
-    prior = detached(clamp_depth)
-    if prior.shape != (height, width):
-        raise ValueError(f"clamp_depth must have shape ({height}, {width}), got {prior.shape}")
-    nearest = (prior.astype(np.float64) + 1) / 2 + TRUNCATION
-    for n in LAYERS:
-        layers = tl.peel(clip, faces, (width, height), layers=n, **options)
-        is_behind = (layers.triangle >= 0) & (layers.depth > nearest[..., None])
-        if (is_behind.any(axis=2) | (layers.count < n)).all():
-            break
-    findices, barycentric = np.zeros((height, width), np.int32), np.zeros((height, width, 3), np.float32)
-    for k in range(n):
-        chosen = is_behind[..., k] & (findices == 0)
-        if chosen.any():
-            findices[chosen] = layers.triangle[chosen, k] + 1
-            barycentric[chosen] = layers.layer(k).barycentric()[chosen]
-    return of.asarray(findices), of.asarray(barycentric)
+    frags = tl.rasterize(clip, faces, (width, height), subpixel_bits="exact", far_clip=False)
+    return of.asarray(frags.triangle + 1), of.asarray(frags.barycentric())
 
 
 def interpolate(col: Any, findices: Any, barycentric: Any, tri: Any) -> Any:
