@@ -45,22 +45,17 @@ def install_trimesh() -> None:
     import_module("topleft.compat.trimesh").install()
 
 
-def install_mujoco() -> None:
-    """Have MuJoCo's own calls draw by `topleft.compat.mujoco`, and with them Gymnasium and dm_control."""
-    import_module("topleft.compat.mujoco").install()
-
-
-def install_nvdiffrast() -> None:
-    """Have `import nvdiffrast.torch` give `topleft.torch`, on the CPU where the program names CUDA."""
-    import_module("topleft.compat.nvdiffrast").install()
+def install_of(module: str) -> Callable[[], None]:
+    """The `install` of a module of topleft."""
+    return lambda: import_module(f"topleft.compat.{module}").install()
 
 
 INSTALL: Mapping[str, Callable[[], None]] = MappingProxyType({
     "pyrender": install_pyrender,
     "trimesh": install_trimesh,
-    "mujoco": install_mujoco,
+    "mujoco": install_of("mujoco"),
     "bop": stands_for("bop_toolkit_lib.rendering.renderer", module="bop"),
-    "nvdiffrast": install_nvdiffrast,
+    "nvdiffrast": install_of("nvdiffrast"),
     "pytorch3d": install_pytorch3d,
     "custom_rasterizer": stands_for("custom_rasterizer", module="custom_rasterizer"),
     "texture_baker": stands_for("texture_baker", module="texture_baker"),
