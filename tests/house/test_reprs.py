@@ -1,4 +1,4 @@
-"""Values show themselves in one line; scenes and plans as a table in a notebook."""
+"""Values show themselves in one line; scenes as a table in a notebook."""
 
 import numpy as np
 import pytest

@@ -163,7 +163,7 @@ def test_explain_is_a_table():
 def test_repr_is_short_and_html_is_escaped():
     plan = tl.plan(*boxes(8, 9), SIZE)
     assert repr(plan) == "<Plan: rasterize 320x200, 2 triangles, 1 thread>"
-    assert plan._repr_html_().startswith("<table><caption>rasterize -&gt; triangle, depth")
+    assert plan._repr_html_().startswith("<pre>rasterize -&gt; triangle, depth")
 
 
 def test_plan_of_a_mesh_counts_its_clusters():

@@ -52,8 +52,6 @@ class Clusters:
         Its triangles, their indices checked.
     own_points : ndarray, shape (N, 3)
         The vertices cluster by cluster, vertices on borders several times, and some rows that may be read past the end.
-    n_bytes : int
-        How much memory the copy takes.
     n_drawn : int, optional
         Of clusters that are a part of those of the mesh: how many triangles they have. Nothing else draws that part.
     """
@@ -98,7 +96,6 @@ class Clusters:
         self.points, self.triangles, self.backoff = points, triangles, Backoff()
         self.own_points, self._records, self.order = own_points, records, order
         self.engine, self.n_drawn = engine.Clustered(records, boxes, corners, order), None
-        self.n_bytes = sum(array.nbytes for array in (own_points, records, boxes, corners, order))
 
     def __len__(self) -> int:
         return len(self.engine)

@@ -191,9 +191,3 @@ def area_band(height: int, width: int, n_threads: int, *, in_bands: bool) -> int
         return 1 << bits_of_bands((height, stride), int(cost_table().area_bytes) // 4, n_threads)
     n_parts = max(1, min(n_threads, height))
     return min(-(-height // n_parts), max(1, MAX_CELLS // (n_parts * stride)))
-
-
-def area_cells(height: int, width: int, n_threads: int, *, in_bands: bool) -> int:
-    """Return how many cells `sum_areas` needs."""
-    n_rows = area_band(height, width, n_threads, in_bands=in_bands)
-    return min(n_threads, -(-height // n_rows)) * n_rows * engine.area_stride(width)

@@ -5,6 +5,7 @@ In: the arguments of a verb. Out: a `Plan`: a table of choices and reasons.
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
@@ -26,7 +27,7 @@ from topleft._meshes.lod.detail import check_tolerance, choose_detail
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.plan.facts import CLASSES, find_cluster_facts, find_facts
 from topleft._meshes.plan.stages import Stage, find_stages, plan_detail
-from topleft._meshes.plan.table import as_html, as_text
+from topleft._meshes.plan.table import as_text
 from topleft.typing import DepthTestOption, OutputOption
 
 #: Which verb gives an output.
@@ -96,7 +97,7 @@ class Plan:
         )
 
     def _repr_html_(self) -> str:
-        return as_html(self.to_dict())
+        return f"<pre>{html.escape(self.explain())}</pre>"
 
     def explain(self) -> str:
         """Return a table of the stages: the choice, its reason, rejected alternatives, and the measured time."""

@@ -1,8 +1,7 @@
-"""A plan as text and as HTML. In: the mapping of `Plan.to_dict`. Out: a string."""
+"""A plan as text. In: the mapping of `Plan.to_dict`. Out: a string."""
 
 from __future__ import annotations
 
-import html
 import textwrap
 from collections.abc import Mapping
 from typing import Any
@@ -61,16 +60,3 @@ def time_of(stage: Mapping[str, Any]) -> str:
 def milliseconds(ms: float) -> str:
     """Return a time in a unit that fits it."""
     return f"{ms:.1f} ms" if ms >= 10 else f"{ms:.2f} ms" if ms >= 0.1 else f"{1000 * ms:.0f} us"
-
-
-def as_html(plan: Mapping[str, Any]) -> str:
-    """Return a plan as a table."""
-    rows = []
-    for stage in plan["stages"]:
-        rejected = "<br>".join(html.escape(text) for text in stage["rejected"])
-        cells = "".join(f"<td>{html.escape(stage[name])}</td>" for name in ("name", "choice", "why"))
-        rows.append(f"{cells}<td>{rejected}</td><td>{time_of(stage)}</td>")
-    heads = "".join(f"<th>{name}</th>" for name in ("stage", "choice", "why", "not", "measured"))
-    body = "".join(f"<tr>{row}</tr>" for row in rows)
-    caption = f"<caption>{html.escape(title(plan))}</caption>"
-    return f"<table>{caption}<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
