@@ -54,8 +54,8 @@ def signature(thing: Any) -> str:
 
 def attributes(result: type) -> list[str]:
     """Return what the docstring of a class lists as its attributes."""
-    section = re.search(r"Attributes\n\s*-+\n(.*?)(?=\n\s*\n|\Z)", result.__doc__ or "", re.DOTALL)
-    return re.split(r",\s+", ", ".join(re.findall(r"(?m)^    ([\w, ]+?) :", section[1]))) if section else []
+    section = re.search(r"Attributes\n-+\n(.*?)(?=\n\s*\n|\Z)", inspect.getdoc(result) or "", re.DOTALL)
+    return re.split(r",\s+", ", ".join(re.findall(r"(?m)^([\w, ]+?) :", section[1]))) if section else []
 
 
 def public_lines() -> Iterator[str]:

@@ -52,9 +52,9 @@ def tell_of_planes(shot: Shot) -> None:
 
 
 def level_outside() -> int:
-    """The level, as `stacklevel` counts, of the first frame outside of topleft."""
+    """The level, as `stacklevel` counts, of the first frame outside of topleft and of cached properties."""
     frame, n = sys._getframe(1), 1
-    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith("topleft."):
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith(("topleft.", "functools")):
         frame, n = frame.f_back, n + 1
     return n
 
