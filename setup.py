@@ -26,7 +26,7 @@ import sys
 import sysconfig
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
@@ -310,15 +310,9 @@ class BuildTopleft(build_ext):
         return [isa for isa in accepted if isa.name in wanted] if wanted else self.of_this_machine(unasked)
 
     def of_this_machine(self, isas: list[Isa]) -> list[Isa]:
-        """Return the sets that this machine runs; all where the compiler builds for other machines.
-
-        A machine takes the widest. Scalar is then there to be compared with, and has -O1, as vectors of 128 bits.
-        """
+        """Return the sets that this machine runs; all where the compiler builds for other machines."""
         native = [*FLAGS_C, "-march=native"]
-        if not self.accepts(native, ""):
-            return isas
-        scalar, *wider = [isa for isa in isas if self.accepts(native, isa.probe)]
-        return [replace(scalar, flags=["-O1", "-Wno-maybe-uninitialized"]), *wider] if wider else [scalar]
+        return [isa for isa in isas if self.accepts(native, isa.probe)] if self.accepts(native, "") else isas
 
     def can_build(self, isa: Isa) -> bool:
         """Whether the compiler builds for the target of a unit, which may be no machine like this, and the unit."""
