@@ -242,9 +242,9 @@ TL_INLINE vd depths_of_columns(tl_geometry g, const row_edges *r, int64_t k, int
     return vd_mul(vd_set1(r->slope_x[k]), g == TL_FIXED ? x : vd_sub(x, vd_set1(r->x0[k])));
 }
 
-/* Draws the samples [first, end) of up to TL_LANES rows, a row at a time: each has as few vectors as it needs.  Blocks of
- * rows and columns have more vectors and fewer mispredicted branches; Zen 4: labels of 20,000 triangles of 40 px take
- * 0.77 of their time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
+/* Draws the samples [first, end) of up to TL_LANES rows, a row at a time: each has as few vectors as it needs.  Blocks
+ * of rows and columns have more vectors and fewer mispredicted branches; Zen 4: labels of 20,000 triangles of 40 px
+ * take 0.77 of their time with AVX2, 0.96 with AVX-512; ids and depth of a mesh of 100,000 with AVX-512 1.07. */
 TL_INLINE void draw_spans(const tl_target *target, tl_sink sink, vi first, vi end, int n_rows, const double *z_row,
                           int64_t at, const double *z_cols, int32_t id)
 {

@@ -152,7 +152,7 @@ IN_PARTS = {
 #: One pass over vertices, triangles, texels or pixels of a finished picture: it ends first (docs/guide/trust.md).
 PASSES = """snap project clip mark_vertices place_on_curve sort_keys cut_clusters measure_clusters survey_clusters
 find_shown first_bad first_bad_row narrow_triangles take_points count_classes bin list_bins set_inverse_w
-drop_sides list_edges name_triangles set_flat_depth find_instances list_column_runs
+drop_sides list_edges set_flat_depth find_instances list_column_runs
 count_runs write_counts inverse_ws barycentric interpolate fill_slopes fill_texels levels_seen halve_rows paint_flat
 paint_gouraud mean_flat mean_colors composite fill_points list_planes fill_planes shade_normals cut_out vertex_normals
 face_normals find_turned face_angles list_corners find_creases sum_creases box_of_faces unit_vectors move_points

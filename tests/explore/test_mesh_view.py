@@ -217,7 +217,7 @@ def test_dropped_file_becomes_the_mesh_of_that_page_alone(session):
     ("data", "name", "message"),
     [
         (b"ply\nnonsense", "bunny.ply", "cannot read 'bunny.ply': broken"),
-        (b"", "bunny.obj", "'bunny.obj' has no triangles"),
+        (b"", "bunny.obj", "'bunny.obj' is empty"),
         (b"v 1 2 3", "bunny", "the end of the name must tell the format"),
         (b"v 1 2 3", "bunny.o/bj", "the end of the name must tell the format"),
         (PLY % (99_999_999, FACES), "huge.ply", "99999999 vertices, more than the 4194304 of max_vertices"),
