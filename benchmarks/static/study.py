@@ -37,7 +37,7 @@ from topleft._meshes.picture import placed
 
 WHOLE = {"pays_to_cluster": False}
 FORCED = {
-    "pays_to_cluster": True, "pays_to_cluster_shaded": True, "pays_to_draw_clusters": True,
+    "pays_to_cluster": True, "pays_to_cluster_shaded": True, "pays_to_draw_clusters": True, "pays_beside_bands": True,
     "pays_to_draw_instances": True,
 }  # fmt: skip
 

@@ -48,6 +48,21 @@ def test_clusters_are_drawn_where_enough_is_left_out(n, cull, outside, front, pa
 
 
 @pytest.mark.parametrize(
+    ("n", "size", "beyond", "pays"),
+    [
+        (30_000, (640, 480), 0.0, True),
+        (300_000, (1920, 1080), 0.0, False),  # a large picture of a whole mesh is drawn in bands
+        (300_000, (1920, 1080), 0.5, True),  # from inside
+        (30_000, (1920, 1080), 0.5, False),
+        (1_000_000, (1920, 1080), 0.0, True),
+    ],
+)
+def test_clusters_of_a_large_picture_are_drawn_where_triangles_are_many(n, size, beyond, pays):
+    few = Survey(0.9, 0.0, 0.1, 0.0)
+    assert choices.pays_to_draw_from_clusters(View.parse(size, {}), n, few, lambda: beyond) == pays
+
+
+@pytest.mark.parametrize(
     ("n", "cull", "outside", "front", "beyond", "pays"),
     [
         (300_000, "none", 0.0, 0.4, 0.0, True),

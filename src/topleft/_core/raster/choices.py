@@ -226,7 +226,15 @@ def pays_to_draw_from_clusters(
     """
     if view.sampling.n_samples > 1:
         return pays_to_draw_samples(view, n_triangles, survey, share_clipped)
-    return pays_to_draw_clusters(view, n_triangles, survey)
+    return pays_to_draw_clusters(view, n_triangles, survey) and pays_beside_bands(view, n_triangles, share_clipped)
+
+
+def pays_beside_bands(view: View, n_triangles: int, share_clipped: Callable[[], float]) -> bool:
+    """Tell whether clusters, drawn in any order, gain on a whole mesh, which large pictures sort into bands of rows."""
+    costs, n_pixels = cost_table(), view.size[0] * view.size[1]
+    if n_pixels <= costs.near_pixels or n_triangles >= costs.banded_triangles * n_pixels:
+        return True
+    return costs.inside_triangle * n_triangles * share_clipped() >= n_pixels
 
 
 def pays_to_draw_samples(view: View, n_triangles: int, survey: Survey, share_clipped: Callable[[], float]) -> bool:

@@ -92,6 +92,8 @@ class Costs:
     cluster_front: float = row(0.8, "share", "clusters that face the view, at most", STATIC)
     cluster_small: Numbers = row((60_000, 0.1, 0.6), "triangles, shares", "clusters outside, of small meshes", STATIC)
     cluster_middle: Numbers = row((1e6, 0.0, 0.33), "triangles, shares", "the same, of larger meshes", STATIC)
+    banded_triangles: float = row(0.4, "triangles", "a pixel of a large picture, for clusters in no order", STATIC)
+    inside_triangle: float = row(50, "pixels", "of it, a triangle beyond the near or far plane instead", STATIC)
     cluster_layers: Numbers = row((3.0, 2.0), "layers", "instances behind each other: at least; that are drawn", STATIC)
     cluster_scene: Numbers = row((0.1, 0.33), "shares", "clusters outside, of scenes: one sample, several", STATIC)
     cluster_drawn: float = row(120_000, "ns", "an instance that is drawn from clusters, beside its triangles", "balls")
