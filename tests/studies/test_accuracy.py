@@ -101,7 +101,7 @@ def test_chart_no_snap_is_the_first_mark_of_those_without_a_wrong_pixel(family):
     record = json.loads((Path(accuracy.__file__).parents[1] / "records/accuracy.json").read_text())
     rows = [*with_no_snap(record), *record["pure"], *record["peers"]]
     right = sorted((row["ns_triangle"], row.get("precision")) for row in rows
-                   if row["family"] == family and row["wrong_px"] == 0)  # fmt: skip
+                   if row["family"] == family and row.get("wrong_px") == 0)  # fmt: skip
     assert right[0][1] == NO_SNAP
     assert right[1][0] > 5 * right[0][0]
 
