@@ -223,14 +223,16 @@ def test_out_after_an_interrupt_changes_no_more():
 
 def test_a_signal_whose_handler_draws_leaves_the_picture_as_it_is():
     few = np.ascontiguousarray(flat()[0][:1_500]), flat()[1][:500]
-    expected, n_drawn = tl.overdraw(*few, SIZE, threads=1), []
-    others = random_triangles(300, 30)
+    others, n_drawn = random_triangles(300, 30), []
+    began = time.perf_counter()
+    expected = tl.overdraw(*few, SIZE, threads=1)
+    soon = (time.perf_counter() - began) / 4
 
     def draw(*_):
         n_drawn.append(int(tl.coverage(*others, (100, 100), threads=1).sum()))
 
     before = signal.signal(signal.SIGALRM, draw)
-    signal.setitimer(signal.ITIMER_REAL, 0.02)  # while the kernel draws
+    signal.setitimer(signal.ITIMER_REAL, soon)  # while the kernel draws
     try:
         got = tl.overdraw(*few, SIZE, threads=1)
     finally:
