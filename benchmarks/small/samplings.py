@@ -36,7 +36,7 @@ def chart_samplings() -> Figure:
     """Return a panel for each sampling: coverage as colour and as number, triangles as lines, samples as dots."""
     from matplotlib import pyplot as plt
 
-    figure, grid = plt.subplots(2, 4, figsize=(13, 5.9), layout="constrained")
+    figure, grid = plt.subplots(4, 2, figsize=(6.6, 11.2), layout="constrained")
     for axis, sampling in zip(grid.flat, ORDER, strict=True):
         draw_panel(axis, sampling)
     return figure
