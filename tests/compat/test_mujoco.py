@@ -106,6 +106,18 @@ def test_height_field_is_closed_and_as_high_as_its_data():
     assert np.isclose(volume(mesh), 8 * (0.5 * halves.mean() + 0.1))
 
 
+@pytest.mark.parametrize("i", [2, 3])
+def test_mesh_and_its_hull_are_those_of_their_rows(i):
+    """Mesh 1 of a model, behind a mesh of one vertex."""
+    own = {"mesh_vertadr": [0, 1], "mesh_vertnum": [1, 3], "mesh_vert": [[9, 9, 9], [0, 0, 0], [1, 0, 0], [0, 1, 0]]}
+    own |= {"mesh_faceadr": [0, 0], "mesh_facenum": [0, 1], "mesh_face": np.array([[0, 1, 2]])}
+    own |= {"mesh_normaladr": [0, 1], "mesh_normal": [[1, 0, 0], [0, 0, 1]], "mesh_facenormal": np.array([[0, 0, 0]])}
+    own |= {"mesh_graphadr": [0, 1], "mesh_graph": [7, 3, 1, *[7] * 12, 0, 1, 2], "mesh_texcoordadr": [-1, -1]}
+    mesh = shapes.asset(SimpleNamespace(**own), i)
+    assert mesh.vertices[mesh.triangles].tolist() == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+    assert mesh.normals is None if i == 3 else mesh.normals.tolist() == [[0, 0, 1]] * 3
+
+
 # A stand-in for MuJoCo: what it hands over for a floor, a ball and a box
 
 F = np.float32

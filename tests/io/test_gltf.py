@@ -88,12 +88,11 @@ def test_gltf_of_points_alone_becomes_points(load):
 
 def test_gltf_nodes_place_by_matrix_and_by_trs(load):
     file = GltfFile()
-    mesh = file.mesh(file.primitive())
-    half = float(np.sqrt(0.5))
-    child = file.node(mesh=mesh, rotation=[0, 0, half, half], scale=[2, 1, 1], translation=[0, 0, 1])
+    mesh = file.mesh(file.primitive(TRIANGLE + [0, 0, 1]))
+    child = file.node(mesh=mesh, rotation=[0.5, 0.5, 0.5, 0.5], scale=[2, 1, 1], translation=[0, 0, 1])  # x to y to z
     file.node(children=[child], matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 10, 0, 0, 1])
     found = load(file)
-    assert found.vertices == pytest.approx(np.array([[10, 0, 1], [10, 2, 1], [9, 0, 1]]), abs=1e-6)
+    assert found.vertices == pytest.approx(np.array([[11, 0, 1], [11, 2, 1], [11, 0, 2]]), abs=1e-6)
 
 
 def test_gltf_mirrored_node_keeps_the_outside(load):

@@ -286,6 +286,12 @@ def test_fan_without_an_apex_drops_what_turns_against_the_polygon():
     assert [[v.xy_fx for v in t] for t in kept] == [[(0, 0), (10, 0), (0, 8)]]
 
 
+def test_clip_turn_is_the_sign_of_the_determinant():
+    for corners in np.random.default_rng(1).integers(-3, 4, (50, 3, 4)):
+        determinant = np.linalg.det(corners[:, [0, 1, 3]])
+        assert ref._clip_turn(*corners.tolist()) == -np.sign(round(determinant))
+
+
 def test_transform_float32_rounds_each_operation():
     matrix = np.array([[1, 1, 0, 0], [0, 1, 0, 2**24], [0, 0, 1, 0], [0, 0, 0, 1]], float)
     point = [[1.0, 1e-9, 3.0]]

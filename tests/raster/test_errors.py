@@ -85,9 +85,10 @@ def test_vertex_beyond_the_fixed_point_range_names_the_row(bits):
 
 
 @pytest.mark.parametrize("value", [2**54, -(2**54), 2**63 - 1, -(2**63)])
-def test_integer_vertex_beyond_the_fixed_point_range_raises(value):
+@pytest.mark.parametrize("axis", [0, 1])
+def test_integer_vertex_beyond_the_fixed_point_range_raises(value, axis):
     with raises(ValueError, "vertices must lie within 2**54 pixels of 0"):
-        tl.coverage(np.array([[0, 0], [value, 0], [0, 4]]), [[0, 1, 2]], SIZE)
+        tl.coverage(np.roll([[0, 0], [value, 0], [0, 4]], axis, 1), [[0, 1, 2]], SIZE)
 
 
 def test_uint64_vertex_beyond_int64_raises():

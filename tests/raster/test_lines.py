@@ -115,6 +115,14 @@ def test_wireframe_at_the_limits_of_fixed_point_equals_reference(bits):
         assert_exact(tl.wireframe(xy, triangles, (9, 8), **view), ref.wireframe(xy, triangles, (9, 8), **view))
 
 
+def test_line_from_the_near_plane_to_the_eye_is_a_point():
+    """Either end may lie on the plane."""
+    for ends in ((0, 1, 0), (1, 0, 1)):
+        scene = [[0, 0, -1], [0.9, 0, -2]], [ends], (3, 3)
+        for draw in (tl.wireframe, ref.wireframe):
+            assert rows(draw(*scene, transform=np.eye(4))) == ["...", ".1.", "..."]
+
+
 @ON_EACH_ISA
 def test_antialiased_equals_exact_distances(isa):
     for name in ("few_bits", "slivers", "snap_degenerates", "window_of_soup", "clip_soup", "floor"):
