@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from benchmarks.report.charts import STYLE, write_chart
 
@@ -51,6 +52,7 @@ def draw_mesh(panel: Any, mesh: dict[str, Any], tolerance: float) -> None:
     panel.set_yscale("log")
     ticks = [SMALLEST_PX, 0.1, 0.5, 1, 10, 100]
     panel.set_xticks(ticks, ["0", *(f"{tick:g}" for tick in ticks[1:])])
+    panel.yaxis.set_major_locator(LogLocator(subs=(1, 3)))
     panel.yaxis.set_major_formatter("{x:g}")
     panel.minorticks_off()
     panel.set_title(f"{mesh['name']}, {mesh['n_triangles']:,} triangles")
