@@ -33,6 +33,15 @@ def test_grid_without_crs_prints_as_before():
     assert repr(GRID).endswith("y='up', crs='EPSG:25832', nodata=-9999)")
 
 
+def test_bounds_for_an_extent_are_told_where_they_can_be():
+    coords = pytest.importorskip("rasterio.coords")
+    for bounds in ((0, 0, 5, 12), coords.BoundingBox(0, 3, 5, 12)):
+        with pytest.raises(ValueError, match=rf"top\) have extent=\(0.0, 5.0, {float(bounds[1])}, 12.0\)"):
+            tl.Grid(4, bounds)
+    with pytest.raises(ValueError, match=r"got 0.0, 4.0, 2.0, 1.0$"):
+        tl.Grid(4, (0, 4, 2, 1))
+
+
 @pytest.mark.parametrize(
     ("more", "said"), [({"crs": 1.5}, "crs must be an EPSG code"), ({"nodata": "x"}, "nodata must")]
 )

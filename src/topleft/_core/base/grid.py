@@ -32,7 +32,10 @@ ExtentLike: TypeAlias = Sequence[float] | npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class Grid:
-    """A picture laid over the plane of the data.
+    """A picture laid over the plane of the data: its size, and its extent (x_min, x_max, y_min, y_max).
+
+    Bounds of rasterio, shapely and geopandas are in another order, (left, bottom, right, top): their extent is (left,
+    right, bottom, top). `Grid.like` takes the grid of a raster.
 
     Parameters
     ----------
@@ -52,7 +55,7 @@ class Grid:
     Raises
     ------
     ValueError
-        If the extent is empty or not finite, or `y` is neither "up" nor "down".
+        If the extent is empty, not finite or a BoundingBox of rasterio, or `y` is neither "up" nor "down".
     TypeError
         If `crs` is no CRS, or `nodata` no number.
 
@@ -88,9 +91,12 @@ class Grid:
             x_min, x_max, y_min, y_max = map(float, self.extent)
         except (TypeError, ValueError):
             raise ValueError(f"extent must be (x_min, x_max, y_min, y_max), got {self.extent!r}") from None
-        if not (np.isfinite([x_min, x_max, y_min, y_max]).all() and x_min < x_max and y_min < y_max):
+        is_box = hasattr(self.extent, "bottom")  # a BoundingBox of rasterio
+        if is_box or not (np.isfinite([x_min, x_max, y_min, y_max]).all() and x_min < x_max and y_min < y_max):
+            may_be_bounds = is_box or (x_min < y_min and x_max < y_max)
             raise ValueError(
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
+                + f"; bounds (left, bottom, right, top) have extent=({x_min}, {y_min}, {x_max}, {y_max})" * may_be_bounds
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
         parse(YOption, "y", self.y)
