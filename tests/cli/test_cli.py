@@ -320,6 +320,18 @@ def test_render_impossible_is_one_line_and_status_2(run, folder, arguments, line
     assert names(folder) == ["broken.obj", "empty.obj", "notes.txt"]
 
 
+@pytest.mark.parametrize(
+    "command",
+    [["render", "-o", "a.png"], ["mask", "-o", "a.png"], ["raster", "-o", "a.tif", "--size", "8x8"],
+     ["bake", "-o", "a.png"], ["explain"]],
+)  # fmt: skip
+@pytest.mark.parametrize("url", ["https://a.b/c.obj", "https://a.b/c.geojson"])
+def test_urls_are_refused_by_every_command_that_reads(run, command, url):
+    status, lines = run(command[0], url, *command[1:])
+    assert (status, len(lines)) == (2, 1)
+    assert lines[0].endswith(f"must be a file of this machine, got the URL '{url}': download it first")
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
 def test_render_into_a_protected_folder_is_one_line_and_status_2(run, folder):
     (folder / "locked").mkdir(mode=0o555)

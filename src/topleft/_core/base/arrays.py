@@ -314,7 +314,7 @@ def as_path(name: str, value: object) -> Path:
     if not isinstance(value, str | os.PathLike):
         raise TypeError(f"{name} must be a path, got {shown(value)}")
     if "://" in os.fspath(value):
-        raise FileNotFoundError(f"{name} must be a file of this machine, got the URL {value!r}")
+        raise FileNotFoundError(f"{name} must be a file of this machine, got the URL {value!r}: download it first")
     return Path(value)
 
 

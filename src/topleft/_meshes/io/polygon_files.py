@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from topleft._core.base.arrays import as_path
 from topleft._core.base.georeference import WGS84
 from topleft._core.base.notes import Notes, tell
 from topleft._core.polygons.rings import LOWER_KINDS, RingSet, united
@@ -102,7 +103,7 @@ def load_polygons(
     Without `has_crowds` annotations of COCO that are crowds are left out. `layer` is that of a vector file, its first
     one unless given. `image` chooses images of COCO by a name, or a folder and a name, without the end.
     """
-    path = Path(path)
+    path = as_path("path", path)
     if path.exists() and not path.is_file():
         raise MeshError(f"{str(path)!r} is {'a folder' if path.is_dir() else 'a pipe or a device'}, not a file")
     is_vector, notes = path.suffix.lower() in VECTOR_SUFFIXES, Notes(str(path))

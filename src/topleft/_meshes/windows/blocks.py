@@ -24,7 +24,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import I32, Array
-from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, as_plane_points, shown
+from topleft._core.base.arrays import INT32_MAX, as_aligned, as_array, as_path, as_plane_points, shown
 from topleft._core.base.memory import FRESH, Memory
 from topleft._meshes.io.limits.npy import check_header
 from topleft._meshes.io.load import MESHIO_READERS, load, load_cells
@@ -205,7 +205,7 @@ def open_triangles(mesh: Any, folder: str | os.PathLike[str] | None) -> Triangle
     if isinstance(mesh, IndexedTriangles | SeparateTriangles):
         return mesh
     if isinstance(mesh, str | os.PathLike):
-        return triangles_of_file(Path(mesh))
+        return triangles_of_file(as_path("mesh", mesh))
     if isinstance(mesh, tuple | list) and len(mesh) == 2 and all(isinstance(part, str | os.PathLike) for part in mesh):
         return of_arrays(mapped_npy(Path(mesh[0])), mapped_npy(Path(mesh[1])))
     if isinstance(mesh, Iterator):
