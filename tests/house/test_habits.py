@@ -96,6 +96,25 @@ def test_color_that_is_none_is_told(color, message):
         tl.render(CUBE, CAMERA, SIZE, color=color)
 
 
+def test_color_of_integers_that_may_be_shares_is_warned_of_at_the_call():
+    told = re.escape("color (1, 1, 0) of integers is of 0 to 255, nearly black: write (1.0, 1.0, 0.0) for full")
+    for make in (tl.Material, lambda color: tl.render(CUBE, CAMERA, SIZE, color=color)):
+        with pytest.warns(UserWarning, match=told) as caught:
+            make((1, 1, 0))
+        assert {warning.filename for warning in caught} == {__file__}
+    with pytest.warns(UserWarning, match=re.escape("background (1, 1, 1, 1) of integers")):
+        tl.render(CUBE, CAMERA, SIZE, background=(1, 1, 1, 1))
+
+
+def test_dark_colors_of_bytes_and_of_files_are_not_warned_of(tmp_path, recwarn):
+    (tmp_path / "a.mtl").write_text("newmtl m\nKd 0.004 0.004 0\n")
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n")
+    assert tl.load(tmp_path / "a.obj").materials[0].color == (1, 1, 0)
+    for dark in ((0, 0, 0), (0, 0, 2), "#010100", np.array([1, 1, 0], np.uint8)):
+        tl.render(CUBE, CAMERA, SIZE, background=dark)
+    assert not recwarn.list
+
+
 def test_background_may_be_transparent():
     assert tl.render(CUBE, CAMERA, SIZE, background="transparent")[0, 0].tolist() == [0, 0, 0, 0]
     assert tl.render(CUBE, CAMERA, SIZE, background=(0.0, 0.0, 1.0, 0.5))[0, 0].tolist() == [0, 0, 255, 128]

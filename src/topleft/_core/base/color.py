@@ -5,6 +5,7 @@ Based on: IEC 61966-2-1, "Default RGB colour space - sRGB", 1999.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias, cast
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from topleft._core.base.array_types import F32, F64, I32, U8, Array
 from topleft._core.base.arrays import as_array, shown
+from topleft._core.base.notes import level_outside
 
 Color = tuple[int, ...]
 ColorLike: TypeAlias = str | Sequence[float] | npt.NDArray[Any]
@@ -67,7 +69,7 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
 
     It may be a name of CSS ("red", "#f2a65a", "rgb(255, 0, 0)", for a background "transparent"); integers of 0 to 255;
     or floats of 0 to 1, which one float among the numbers makes of them all: (1.0, 0, 0) is red, (1, 0, 0) nearly
-    black. Another name, number of channels or range is a `ValueError`, anything else a `TypeError`.
+    black, with a warning. Another name, number of channels or range is a `ValueError`, anything else a `TypeError`.
     """
     if isinstance(color, str) and color == "transparent" and n_channels == 4:
         return (0, 0, 0, 0)
@@ -76,6 +78,10 @@ def as_color(name: str, color: ColorLike, n_channels: int) -> Color:
         channels: tuple[int, ...] = named if n_channels == 4 or named[3] < 255 else named[:3]
     elif type(color) is tuple and set(map(type, color)) == {int} and min(color) >= 0 and max(color) <= 255:
         channels = (*color, 255) if n_channels == 4 and len(color) == 3 else color  # as below, without an array
+        if max(color) == 1 and len(channels) == n_channels:
+            full = tuple(map(float, color))
+            text = f"{name} {color} of integers is of 0 to 255, nearly black: write {full} for full"
+            warnings.warn(text, stacklevel=level_outside())
     else:
         array = as_array(name, color)
         if array.ndim != 1 or array.dtype.kind not in "fiu":

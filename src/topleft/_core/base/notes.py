@@ -5,6 +5,7 @@ Input: kinds and names, and the files that were read, from the readers. Output: 
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -66,6 +67,14 @@ def tell(lines: Iterable[str], stacklevel: int) -> None:
         return
     for line in lines:
         warnings.warn(line, MeshWarning, stacklevel=stacklevel + 1)
+
+
+def level_outside() -> int:
+    """The level, as `stacklevel` counts, of the first frame outside of topleft and of cached properties."""
+    frame, n = sys._getframe(1), 1
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith(("topleft.", "functools")):
+        frame, n = frame.f_back, n + 1
+    return n
 
 
 def tell_files(files: Iterable[Path]) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I64, U8
-from topleft._core.base.color import Color, decode_srgb
+from topleft._core.base.color import decode_srgb
 from topleft._meshes.io.limits.walks import walks
 from topleft._meshes.io.obj import distinct
 from topleft._meshes.io.references import InputFile, numbers_of_text
@@ -377,9 +377,8 @@ def _rgba(values: F64) -> F64:
     return np.append(values, np.ones(4))[:4]
 
 
-def _color(values: F64) -> Color:
-    red, green, blue = np.rint(255 * _rgba(values)[:3].clip(0, 1)).astype(int).tolist()
-    return red, green, blue
+def _color(values: F64) -> U8:
+    return np.rint(255 * _rgba(values)[:3].clip(0, 1)).astype(np.uint8)
 
 
 def _transform(node: Element) -> F64:

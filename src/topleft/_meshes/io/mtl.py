@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from topleft._core.base.array_types import U8
-from topleft._core.base.color import Color, decode_srgb
+from topleft._core.base.color import decode_srgb
 from topleft._meshes.io.references import ROWS_AT_ONCE, InputFile
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.texture import Texture
@@ -377,9 +377,8 @@ def normals_of_heights(heights: U8, scale: float) -> U8:
     return made
 
 
-def _rgb(values: list[float]) -> Color:
-    red, green, blue = (round(255 * _share(value)) for value in _three(values))
-    return red, green, blue
+def _rgb(values: list[float]) -> U8:
+    return np.array([round(255 * _share(value)) for value in _three(values)], np.uint8)
 
 
 def _light(values: list[float]) -> tuple[float, float, float]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from topleft._core.base.color import Color, encode_srgb
+from topleft._core.base.color import encode_srgb
 from topleft._meshes.model.joined import placed_arrays
 from topleft._meshes.model.material import Material
 from topleft._meshes.model.mesh import Mesh
@@ -18,7 +18,7 @@ from topleft._meshes.model.texture import Texture
 from topleft.typing import AlphaModeOption, EncodingOption
 
 ALPHA_MODES: dict[str, AlphaModeOption] = {"OPAQUE": "opaque", "MASK": "mask", "BLEND": "blend"}
-DEFAULT_OF_TRIMESH = ((102, 102, 102), 1.0)
+DEFAULT_OF_TRIMESH = (102, 102, 102, 1.0)
 """Specular colour and glossiness that trimesh gives materials without them."""
 
 
@@ -58,7 +58,7 @@ def material_of(source: Any, known: Textures) -> Material | None:
     if hasattr(source, "diffuse"):
         shininess = float(source.glossiness or 0)
         specular = 0.0 if source.specular is None else float(np.mean(np.asarray(source.specular)[:3])) / 255
-        if source.specular is not None and (_rgb(source.specular), shininess) == DEFAULT_OF_TRIMESH:
+        if source.specular is not None and (*_rgb(source.specular), shininess) == DEFAULT_OF_TRIMESH:
             specular = 0.0  # the file sets no highlights
         texture = _texture(source.image, known)
         color = None if texture else _rgb(source.diffuse)
@@ -103,6 +103,5 @@ def _texture(image: Any, known: Textures, encoding: EncodingOption = "srgb") -> 
     return known[key]
 
 
-def _rgb(values: Any) -> Color:
-    red, green, blue = (int(value) for value in np.asarray(values)[:3])
-    return red, green, blue
+def _rgb(values: Any) -> npt.NDArray[np.int_]:
+    return np.asarray(values)[:3].astype(int)

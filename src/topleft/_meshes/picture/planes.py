@@ -5,7 +5,6 @@ Input: a subject, a scene of it, and the camera of a picture. Output: `MeshWarni
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64, I32
-from topleft._core.base.notes import tell
+from topleft._core.base.notes import level_outside, tell
 from topleft._meshes.camera.camera import Camera
 from topleft._meshes.model.mesh import Mesh
 from topleft._meshes.model.normals import moved
@@ -49,14 +48,6 @@ def tell_of_planes(shot: Shot) -> None:
         lines = list(faults_of(shot.scene, camera, shot.size))
     if lines:
         tell(lines, stacklevel=level_outside())
-
-
-def level_outside() -> int:
-    """The level, as `stacklevel` counts, of the first frame outside of topleft and of cached properties."""
-    frame, n = sys._getframe(1), 1
-    while frame.f_back is not None and str(frame.f_globals.get("__name__")).startswith(("topleft.", "functools")):
-        frame, n = frame.f_back, n + 1
-    return n
 
 
 def faults_of(scene: Scene, camera: Camera, size: tuple[int, int]) -> Iterator[str]:

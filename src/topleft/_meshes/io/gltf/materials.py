@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from topleft._core import engine
 from topleft._core.base.array_types import F64
-from topleft._core.base.color import LIGHT_OF_SRGB, Color, encode_srgb
+from topleft._core.base.color import LIGHT_OF_SRGB, encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
 from topleft._meshes.model.material import Material
@@ -268,11 +268,9 @@ def transform_of(row: Tree) -> npt.NDArray[np.float64]:
     return engine.product(engine.product(UP, downwards), np.vstack([UP, [0, 0, 1]]))
 
 
-def srgb_of_light(light: Any) -> Color:
+def srgb_of_light(light: Any) -> U8:
     """The sRGB bytes of linear red, green and blue."""
-    values = np.rint(255 * encode_srgb(np.asarray(light, np.float64).clip(0, 1))).astype(int)
-    red, green, blue = values.tolist()
-    return red, green, blue
+    return np.rint(255 * encode_srgb(np.asarray(light, np.float64).clip(0, 1))).astype(np.uint8)
 
 
 def _number(row: Tree, name: str, default: float) -> float:
