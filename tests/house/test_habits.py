@@ -34,6 +34,12 @@ def test_direction_in_the_place_of_a_light_is_told():
         tl.render(CUBE, CAMERA, SIZE, lights=[(0, 1, 0)])
 
 
+@pytest.mark.parametrize(("word", "right"), [("resolution", "size"), ("colour", "color"), ("light", "lights")])
+def test_option_of_render_by_another_name_is_told(word, right):
+    with raises(TypeError, f"render() got an unexpected keyword argument '{word}': {right}?"):
+        tl.render(CUBE, CAMERA, **{word: (64, 48)})
+
+
 def test_size_of_one_number_is_a_square():
     assert tl.render(CUBE, size=8).shape == (8, 8, 4)
     assert tl.coverage([[0, 0], [4, 0], [0, 4]], [[0, 1, 2]], 5).shape == (5, 5)

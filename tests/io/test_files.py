@@ -186,6 +186,15 @@ def test_load_folder_is_refused(tmp_path):
         files.load(tmp_path)
 
 
+@pytest.mark.parametrize(("end", "n"), [("3 0 0", 1), ("3 1 0", 0)])
+def test_load_triangles_without_area_are_told(tmp_path, recwarn, end, n):
+    (tmp_path / "a.obj").write_text(f"v 0 0 0\nv 1 0 0\nv {end}\nf 1 1 2\nf 1 2 3\n")
+    files.load(tmp_path / "a.obj")
+    assert [str(warning.message).partition(": ")[2] for warning in recwarn] == [
+        "its triangles have no area: pictures of it are empty"
+    ] * n
+
+
 def test_load_address_is_refused():
     with pytest.raises(FileNotFoundError, match=r"path must be a file of this machine, got the URL 'https://.*obj'"):
         files.load("https://example.com/a.obj")

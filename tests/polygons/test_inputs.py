@@ -217,6 +217,7 @@ def test_square_with_90_000_holes_keeps_three_quarters_of_each_pixel():
         ([("a", "b"), ("c", "d"), ("e", "f")], TypeError, "rings must be real numbers, got dtype <U1"),
         (np.zeros((3, 2), complex), TypeError, "rings must be real numbers, got dtype complex128"),
         (7, TypeError, "rings must be an array (N, 2), a list of rings or of polygons"),
+        ("a.geojson", TypeError, "got str; geopandas.read_file(path) reads files, json.load GeoJSON"),
         ({"type": "Polygon", "id": 1}, ValueError, "a Polygon of GeoJSON must have coordinates, got only type, id"),
         ({"type": "FeatureCollection"}, ValueError, "a FeatureCollection of GeoJSON must have features, got only type"),
         ({"type": "Point", "coordinates": (1, 1)}, TypeError, "geometries must be Polygon or MultiPolygon, got Point"),

@@ -78,7 +78,11 @@ def test_batch_that_does_not_fit_is_refused(arguments, options, message):
 
 @pytest.mark.parametrize(
     ("vertices", "transform", "message"),
-    [(CLIP, None, "rasterize_poses takes .B, V, C."), (MESH.vertices, POSES, "rasterize_poses takes .B, 4, 4.")],
+    [
+        (CLIP, None, "rasterize_poses takes .B, V, C."),
+        (MESH.vertices, POSES, "rasterize_poses takes .B, 4, 4."),
+        (np.zeros((5, 3, 2)), None, r"corners \(T, 3, C\) of triangles are vertices.reshape\(3 \* T, C\), arange"),
+    ],
 )
 def test_rasterize_of_poses_names_the_verb_that_takes_them(vertices, transform, message):
     with pytest.raises(ValueError, match=message):

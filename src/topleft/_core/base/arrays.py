@@ -137,6 +137,8 @@ def as_vertices(values: ArrayLike, *, has_transform: bool) -> NDArray[Any]:
         array = array.reshape(0, 3 if has_transform else 2)
     if array.ndim != 2 or array.shape[1] not in ((3,) if has_transform else (2, 3, 4)):
         poses = "; rasterize_poses takes (B, V, C)" if array.ndim == 3 else ""
+        if array.ndim == 3 and array.shape[1] == 3:
+            poses += "; corners (T, 3, C) of triangles are vertices.reshape(3 * T, C), arange(3 * T).reshape(T, 3)"
         raise ValueError(f"vertices must have shape {wish}, got {array.shape}{poses}")
     if array.shape[0] > INT32_MAX:
         raise ValueError(f"vertices must have at most {INT32_MAX} rows, got {array.shape[0]}")

@@ -96,7 +96,8 @@ class Grid:
             may_be_bounds = is_box or (x_min < y_min and x_max < y_max)
             raise ValueError(
                 f"extent must be finite with x_min < x_max and y_min < y_max, got {x_min}, {x_max}, {y_min}, {y_max}"
-                + f"; bounds (left, bottom, right, top) have extent=({x_min}, {y_min}, {x_max}, {y_max})" * may_be_bounds
+                + f"; bounds (left, bottom, right, top) have extent=({x_min}, {y_min}, {x_max}, {y_max})"
+                * may_be_bounds
             )
         object.__setattr__(self, "extent", (x_min, x_max, y_min, y_max))
         parse(YOption, "y", self.y)

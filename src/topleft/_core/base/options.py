@@ -46,8 +46,8 @@ FIRST_GUESSES = {
     "all_touched": ("outer",), "alpha": ("over",), "face": ("triangle",), "faces": ("triangle",),
     "gouraud": ("smooth",), "id": ("triangle", "instance"), "mask": ("silhouette", "coverage"),
     "normal": ("world_normal", "camera_normal", "normals"), "normals": ("world_normal", "camera_normal"),
-    "object_id": ("instance",), "phong": ("smooth",), "rgb": ("color",), "segmentation": ("instance",),
-    "sun": ("directional",), "winding": ("nonzero",), "z": ("distance",),
+    "object_id": ("instance",), "phong": ("smooth",), "resolution": ("size",), "rgb": ("color",),
+    "segmentation": ("instance",), "sun": ("directional",), "winding": ("nonzero",), "z": ("distance",),
 }  # fmt: skip
 
 SAMPLINGS = {sampling.value: sampling for sampling in Sampling}

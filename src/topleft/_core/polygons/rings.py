@@ -5,6 +5,7 @@ In: arrays, lists of rings, offset arrays, flat COCO lists, `__geo_interface__`,
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -323,9 +324,10 @@ def _nested(values: Any) -> list[list[Any]]:
     if isinstance(values, (list, tuple)) and not len(values):
         return []
     if depth == 0:
+        file = "; geopandas.read_file(path) reads files, json.load GeoJSON" * isinstance(values, str | os.PathLike)
         raise TypeError(
             "rings must be an array (N, 2), a list of rings or of polygons, (coordinates, ring_offsets, "
-            f"polygon_offsets), or have __geo_interface__, got {type(values).__name__}"
+            f"polygon_offsets), or have __geo_interface__, got {type(values).__name__}{file}"
         )
     if depth == 1:
         return [[_unflat(values)]]

@@ -27,6 +27,7 @@ from topleft._meshes.model.cells import Polygons
 from topleft._meshes.model.joined import joined
 from topleft._meshes.model.material import TEXTURES
 from topleft._meshes.model.mesh import Mesh
+from topleft._meshes.model.normals import face_normals
 from topleft._meshes.model.points import Points
 from topleft.errors import MeshError, MissingPackageError
 
@@ -47,6 +48,9 @@ MESHIO_READERS: dict[str, tuple[str, ...]] = {
     ".vtk": ("vtk",), ".vtu": ("vtu",),
 }  # fmt: skip
 """The modules of meshio that read each suffix, in the order in which they are tried."""
+
+TRIANGLES_AT_ONCE = 1 << 14
+"""Triangles whose areas are looked at together."""
 
 
 def load(
@@ -235,7 +239,15 @@ def _mesh(source: InputFile, crease: float) -> Mesh | Points:
         raise MeshError(f"{str(source.path)!r} has no triangles" + (f", but {' and '.join(drawn)}" if drawn else ""))
     if any(part.uv is None and part.uv1 is None and _has_textures(part) for part in parts):
         source.notes.add("textures not drawn, for want of texture coordinates")
+    if not any(map(_has_area, parts)):
+        source.notes.add("its triangles have no area: pictures of it are empty")
     return joined(parts, crease)
+
+
+def _has_area(part: Mesh) -> bool:
+    """Whether a triangle has an area; of most meshes one of the first has."""
+    firsts = range(0, len(part.triangles), TRIANGLES_AT_ONCE)
+    return any(face_normals(part.vertices, part.triangles[i : i + TRIANGLES_AT_ONCE]).any() for i in firsts)
 
 
 def _has_textures(part: Mesh) -> bool:

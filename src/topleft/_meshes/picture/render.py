@@ -20,7 +20,7 @@ from topleft._core.base.arrays import as_size
 from topleft._core.base.color import DEFAULT_COLOR, WHITE, ColorLike
 from topleft._core.base.defaults import DEFAULT_SIZE
 from topleft._core.base.memory import Memory, empty
-from topleft._core.base.options import Sink
+from topleft._core.base.options import Sink, meant
 from topleft._core.raster import choices
 from topleft._core.raster.fragments import Fragments
 from topleft._core.raster.rasterize import FragmentOptions, refuse_many
@@ -195,7 +195,8 @@ def render(
     255
     """
     for option in look.keys() - LookOptions.__annotations__:
-        raise TypeError(f"render() got an unexpected keyword argument {option!r}")
+        known = ("size", *(render.__kwdefaults__ or ()), *LookOptions.__annotations__)
+        raise TypeError(f"render() got an unexpected keyword argument {option!r}{meant(option, known)}")
     view: dict[str, Any] = {"cull": cull, "sampling": sampling, "subpixel_bits": subpixel_bits, "threads": threads}
     given: dict[str, Any] = {"shading": shading, "color": color, "background": background, "threads": threads, **look}
     shot = Shot.of(mesh, camera, size)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from topleft._core import engine
-from topleft._core.base.array_types import F64
+from topleft._core.base.array_types import F64, U8
 from topleft._core.base.color import LIGHT_OF_SRGB, encode_srgb
 from topleft._meshes.io.gltf.accessors import Accessors, Tree, entry, uri_content, whole
 from topleft._meshes.io.references import InputFile
