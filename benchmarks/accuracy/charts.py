@@ -53,7 +53,7 @@ def chart_peers(record: dict[str, Any]) -> Figure:
             axis.plot(x, y, "o", color="black", ms=7)
             axis.annotate(f"topleft, {bits}", (x, y), (-7, 0), textcoords="offset points", ha="right", va="center")
     axis.axhspan(none_wrong / 3, none_wrong * 1.8, color="0.93", zorder=0)
-    axis.set(xscale="log", yscale="log", xlim=(5, 1e6), ylim=(none_wrong / 3, 3e6))
+    axis.set(xscale="log", yscale="log", xlim=(1.5, 3e5), ylim=(none_wrong / 3, 3e6))
     axis.set_title(family["what"], loc="left")
     axis.set(xlabel="time per triangle", ylabel="wrong of a million edge pixels (grey: none)")
     axis.xaxis.set_major_formatter(lambda value, _: duration(value))
