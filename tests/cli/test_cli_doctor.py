@@ -40,13 +40,16 @@ def test_doctor_tells_what_an_extra_lacks(capsys, monkeypatch):
         'none-such-package>=1.4; extra == "formats"',
         'numpy; extra == "formats"',
         'x; extra == "dev"',
+        'torch; extra == "torch"',
     ]
     monkeypatch.setattr("topleft._apps.cli.doctor.requires", lambda name: lines)
+    monkeypatch.setattr("topleft._apps.cli.doctor.installed", {"numpy": "2.0"}.get)
     topleft.cli.main(["doctor"])
     told = capsys.readouterr().out
     assert "extra formats: none-such-package is not installed, numpy" in told
     assert "(pip install none-such-package)" in told
     assert "extra dev" not in told
+    assert "torch is not installed (pip install torch --index-url with the address that pytorch.org" in told
 
 
 @pytest.mark.parametrize("kind", testing.HARD_SCENES)

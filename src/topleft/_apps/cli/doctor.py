@@ -66,6 +66,8 @@ def extras() -> Iterator[str]:
         told = ", ".join(f"{name} {there[name] or 'is not installed'}" for name in names)
         missing = " ".join(name for name in names if there[name] is None)
         hint = f" (pip install {missing})" if missing else ""
+        if "torch" in missing.split():
+            hint = " (pip install torch --index-url with the address that pytorch.org shows for CPU: 0.2 GB, not 5.3)"
         yield f"extra {extra}: {told}{hint}"
 
 
