@@ -116,7 +116,7 @@ DRAWS = {
     "gradients of areas": lambda n: tl.area_vjp(*flat(), SIZE, np.ones(SIZE), threads=n),
     "bake from a source": lambda n: tl.bake(SHEET, "position", 2000, source=BALL, threads=n),
     "voxelize": lambda n: tl.voxelize(BALL, 600, samples=4, threads=n),
-    "voxelize a surface": lambda n: tl.voxelize(BALL, 900, solid=False, rule="touched", threads=n),
+    "voxelize a surface": lambda n: tl.voxelize(large(), 300, solid=False, rule="touched", threads=n),
     "height_map": lambda n: tl.height_map(large(), tl.Grid(SIZE, (0, 2000, 0, 2000)), threads=n),
 }
 
@@ -172,7 +172,7 @@ def seconds_after_interrupt(draw):
     sent, has_ended = [], threading.Event()
 
     def interrupt():
-        has_ended.wait(0.3)
+        has_ended.wait(0.15)
         if not has_ended.is_set():  # a signal that comes later would end pytest
             sent.append(time.process_time())
             os.kill(os.getpid(), signal.SIGINT)
